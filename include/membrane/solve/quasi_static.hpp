@@ -116,8 +116,8 @@ class QuasiStaticSolver {
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.active_, self.state_, self.predictor_, self.last_prescribed_, self.woken_, self.placed_, self.moved_,
-              self.last_displacements_, self.pins_, self.pinned_at_, self.pins_known_, self.last_advanced_,
-              self.complete_, self.pose_, self.deformations_, self.resume_, self.costs_);
+              self.last_displacements_, self.pins_, self.fixed_at_, self.pins_known_, self.complete_, self.pose_,
+              self.deformations_, self.resume_, self.costs_);
         if constexpr (Visit::restores) self.report_ = {};
     }
 
@@ -159,8 +159,7 @@ class QuasiStaticSolver {
     template <class Volume>
     void extrapolate(const ConstraintList<Scalar>& acting, ConstraintContext<Scalar>& context) noexcept;
     template <class Network>
-    void seed_beside_moved_pins(const Network& network, ConstraintContext<Scalar>& context, bool with_body,
-                                bool last_advanced) noexcept;
+    void seed_beside_moved_pins(const Network& network, ConstraintContext<Scalar>& context, bool with_body) noexcept;
     template <class Network>
     void select(const Network& network, const ConstraintContext<Scalar>& context) noexcept;
     template <class Network>
@@ -172,7 +171,6 @@ class QuasiStaticSolver {
         const auto moved = moved_.items();
         return std::find(moved.begin(), moved.end(), v) != moved.end();
     }
-    [[nodiscard]] bool begin_report(std::size_t constraints) noexcept;
     [[nodiscard]] StepReport<Scalar> refuse_step(StepStatus status) noexcept;
 
     [[no_unique_address]] Rule rule_;
@@ -187,9 +185,8 @@ class QuasiStaticSolver {
     FixedVector<Index> moved_;           // in the last step that advanced
     Points<Scalar> last_displacements_;  // of `moved_` [m]
     FixedVector<Index> pins_;            // the pinned vertices
-    Points<Scalar> pinned_at_;           // positions of `pins_` in the last step that advanced [m]
+    Points<Scalar> fixed_at_;            // of pinned and prescribed vertices in the last step that advanced [m]
     bool pins_known_ = false;            // whether there was one
-    bool last_advanced_ = false;         // whether it was the last step
     Predictor<Scalar, StepState<Scalar>::max_constraints> predictor_;
     std::array<Vector3<Scalar>, StepState<Scalar>::max_constraints> reactions_{};
     StepReport<Scalar> report_;
@@ -251,7 +248,7 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const
       moved_(static_cast<std::size_t>(network.vertex_count())),
       last_displacements_(Points<Scalar>::Zero(3, options.predict ? network.vertex_count() : 0)),
       pins_(detail::max_pins(network)),
-      pinned_at_(Points<Scalar>::Zero(3, static_cast<Index>(pins_.capacity()))) {
+      fixed_at_(Points<Scalar>::Zero(3, network.vertex_count())) {
     detail::define_made<QuasiStaticSolver>();
     if constexpr (requires { rule.validate(); }) rule.validate();
     if constexpr (requires { network.splits(); }) state_.splits = network.splits();
@@ -270,7 +267,8 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
                                                             const Network& network, const Volume& volume,
                                                             Constraints constraints) noexcept {
     detail::require_made<QuasiStaticSolver>();
-    const bool last_advanced = begin_report(constraints.size());
+    reactions_.fill(Vector3<Scalar>::Zero());
+    report_ = {.reactions = {reactions_.data(), constraints.size()}};
     const Index count = state_.vertex_count();
     if (x.cols() != count || network.vertex_count() != count || !has_vertices(volume, count))
         return refuse_step(StepStatus::wrong_vertex_count);
@@ -282,12 +280,12 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     const ConstPointsRef<Scalar> start = x, now = state_.positions();
     ConstraintContext<Scalar> context(start, state_, network);
     const ConstraintList<Scalar> acting(context, constraints);
-    seed_beside_moved_pins(network, context, body_moved, last_advanced);
     const StepStatus begun = begin_constraints(acting, context, network, volume);
     if (begun != StepStatus::advanced) return refuse_step(begun);
 
     const StepInput<Scalar, Network, Volume> scene{start, now, dt, network, volume, state_};
     set_supports(scene, options_.rigid_stiffness, state_.seeds.items());
+    seed_beside_moved_pins(network, context, body_moved);
     select(network, context);
     Sweeps<Scalar, Rule, Network, Volume> sweeps{scene,  rule_,  options_, executor_, active_, packed_,
                                                  spare_, acting, report_,  budget,    resume_};
@@ -307,15 +305,6 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     measure_beyond(scene);
     sweeps.budget.end();
     return report_;
-}
-
-// Returns whether the last step advanced: then the state has the positions after it.
-template <Real Scalar, CheckedStepRule<Scalar> Rule>
-bool QuasiStaticSolver<Scalar, Rule>::begin_report(std::size_t constraints) noexcept {
-    const bool last_advanced = std::exchange(last_advanced_, false);
-    reactions_.fill(Vector3<Scalar>::Zero());
-    report_ = {.reactions = {reactions_.data(), constraints}};
-    return last_advanced;
 }
 
 // Extrapolates, and begins the constraints. Returns why the step is refused: an input is invalid, a part has missed a
@@ -387,25 +376,21 @@ void QuasiStaticSolver<Scalar, Rule>::extrapolate(const ConstraintList<Scalar>& 
 }
 
 // A force enters the membrane beside vertices that the caller has moved: pinned by the network, or prescribed in the
-// last step. With its body it moves without a force. Until the constraints begin, positions are those of the last step,
-// if that advanced; if not, the prescribed vertices may have moved since.
+// last step. With its body it moves without a force.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Network>
 void QuasiStaticSolver<Scalar, Rule>::seed_beside_moved_pins(const Network& network, ConstraintContext<Scalar>& context,
-                                                             bool with_body, bool last_advanced) noexcept {
+                                                             bool with_body) noexcept {
     if (!pins_known_ || with_body) return;
-    const auto seed_beside = [&](Index v) {
+    const auto seed_beside_moved = [&](Index v) {
+        if (context.start(v) == point(fixed_at_, v)) return;
         for (const auto& end : network.neighbours(v)) {
-            if (!network.pinned(end.other) && !last_prescribed_.contains(end.other)) context.seed(end.other);
+            if (!context.fixed(end.other)) context.seed(end.other);
         }
     };
-    for (const Index v : last_prescribed_.items()) {
-        if (!last_advanced || state_.position_of(v) != context.start(v)) seed_beside(v);
-    }
-    for (std::size_t i = 0; i < pins_.size(); ++i) {
-        const Index v = pins_[i];
-        const bool moved = context.start(v) != point(pinned_at_, static_cast<Index>(i));
-        if (moved && network.pinned(v)) seed_beside(v);
+    for (const Index v : last_prescribed_.items()) seed_beside_moved(v);
+    for (const Index v : pins_.items()) {
+        if (network.pinned(v)) seed_beside_moved(v);
     }
 }
 
@@ -469,8 +454,10 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
     }
     complete_ = !report_.out_of_time && !active_.truncated();
     std::swap(last_prescribed_, state_.prescribed);
-    for (std::size_t i = 0; i < pins_.size(); ++i) pinned_at_.col(static_cast<Index>(i)) = point(x, pins_[i]);
-    pins_known_ = last_advanced_ = true;
+    for (const auto fixed : {std::span<const Index>(pins_.items()), last_prescribed_.items()}) {
+        for (const Index v : fixed) fixed_at_.col(v) = point(x, v);
+    }
+    pins_known_ = true;
     state_.end_step();
 }
 
@@ -525,10 +512,8 @@ void QuasiStaticSolver<Scalar, Rule>::split(const VertexSplit& split) noexcept {
     if (options_.predict) last_displacements_.col(split.copy) = last_displacements_.col(split.vertex);
     if (has_moved(split.vertex)) moved_.try_push_back(split.copy);
     const auto pins = pins_.items();
-    const auto pin = std::find(pins.begin(), pins.end(), split.vertex);
-    if (pin == pins.end()) return;
-    const auto at = static_cast<Index>(pin - pins.begin()), copy_at = static_cast<Index>(pins_.size());
-    if (pins_.try_push_back(split.copy)) pinned_at_.col(copy_at) = pinned_at_.col(at);
+    if (std::find(pins.begin(), pins.end(), split.vertex) == pins.end()) return;
+    if (pins_.try_push_back(split.copy)) fixed_at_.col(split.copy) = fixed_at_.col(split.vertex);
 }
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
@@ -543,7 +528,8 @@ void QuasiStaticSolver<Scalar, Rule>::reset() noexcept {
     active_.clear();
     state_.reset();
     predictor_.reset();
-    complete_ = pins_known_ = last_advanced_ = false;
+    complete_ = pins_known_ = false;
+    fixed_at_.setZero();
     last_prescribed_.clear();
     woken_.clear();
     placed_.clear();
