@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
 //
-// An engine presses a membrane (soft_tissue.hpp), pauses, saves, loads, teleports and resets it; a thread of the
-// membrane's own makes its ticks at 1 kHz. The engine's sphere has a seam: two vertices at each of its positions.
+// An engine presses a membrane (soft_tissue.hpp), pauses, saves, loads, teleports and resets it, and is refused a
+// position; a thread of the membrane's own makes its ticks at 1 kHz. The engine's sphere has a seam: two vertices at each of its positions.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <limits>
 #include <numbers>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -51,7 +53,7 @@ int main() {
 
     // Frames of the engine until the haptic thread has made so many ticks.
     const auto draw_for = [&](std::uint64_t ticks) {
-        for (const auto start = tissue.force().number; tissue.force().number < start + ticks;
+        for (const auto start = tissue.feedback().number; tissue.feedback().number < start + ticks;
              tissue.draw(mesh.vertices))
             std::this_thread::sleep_for(std::chrono::milliseconds(16));
     };
@@ -61,8 +63,10 @@ int main() {
             displacement = std::max(displacement, distance(mesh.vertices[i].position, rest[i].position));
         for (std::size_t i = 0; i < rest.size(); i += slices + 1)
             seam = std::max(seam, distance(mesh.vertices[i].position, mesh.vertices[i + slices].position));
-        std::printf("%-10s %5.1f mN, %.3f mm displaced, seam open by %.3f mm\n", what,
-                    1e3 * static_cast<double>(tissue.force().value.norm()), 1e3 * displacement, 1e3 * seam);
+        const auto& felt = tissue.feedback().value;
+        std::printf("%-10s %5.1f mN, %.3f mm displaced, seam open by %.3f mm, %s\n", what,
+                    1e3 * static_cast<double>(felt.force.norm()), 1e3 * displacement, 1e3 * seam,
+                    std::string(to_string(felt.status)).c_str());
     };
 
     const auto outside = tool;
@@ -86,6 +90,11 @@ int main() {
     tissue.pause(false);
     draw_for(10);
     print("loaded");
+
+    tool.position.x() = std::numeric_limits<float>::quiet_NaN();
+    tissue.move(tool);
+    draw_for(10);
+    print("refused");
 
     tissue.reset();
     tissue.teleport(outside);

@@ -30,7 +30,10 @@ struct EngineVertex {
 class SoftTissue {
   public:
     using Tool = membrane::Tool<float>;
-    using Force = membrane::Vector3<float>;
+    struct Feedback {
+        membrane::Vector3<float> force = membrane::Vector3<float>::Zero();  ///< on the tool [N]; zero if refused
+        membrane::StepStatus status = membrane::StepStatus::advanced;       ///< why the step was refused, `to_string`
+    };
 
     /// Vertices at one position, as along a seam of the texture, are one vertex of the membrane.
     /// @throws membrane::InvalidInput for a mesh that is no membrane
@@ -42,10 +45,10 @@ class SoftTissue {
     }
 
     ///@{
-    /// In each frame: moves the tool; the membrane's force on it [N], with the number and the time of its tick; writes
-    /// the vertices that have changed, and returns how many.
+    /// In each frame: moves the tool; the last tick's feedback, with the tick's number and time; writes the vertices
+    /// that have changed, and returns how many.
     void move(const Tool& tool) { tool_.publish(tool, now()); }
-    [[nodiscard]] const auto& force() { return force_.read(); }
+    [[nodiscard]] const auto& feedback() { return feedback_.read(); }
     std::size_t draw(std::span<EngineVertex> vertices);
     ///@}
 
@@ -54,7 +57,7 @@ class SoftTissue {
     void pause(bool paused) {
         const std::scoped_lock between_ticks(mutex_);
         paused_ = paused;
-        force_.publish(Force::Zero(), now());
+        feedback_.publish({}, now());
     }
     void teleport(const Tool& tool) {  // not through the surface between
         const std::scoped_lock between_ticks(mutex_);
@@ -107,7 +110,7 @@ class SoftTissue {
     bool paused_ = false;
     // Of both threads.
     membrane::Latest<Tool> tool_;
-    membrane::Latest<Force> force_{Force::Zero()};
+    membrane::Latest<Feedback> feedback_;
     membrane::MovedPoints<float> moved_;
     std::mutex mutex_;
     std::atomic<bool> running_{true};
@@ -168,7 +171,7 @@ inline void SoftTissue::tick() noexcept {
     if (report.status == membrane::StepStatus::advanced) last_tool_ = tool;
     tree_.refit(x_, report.moved);
     moved_.publish(report.moved, x_, now());
-    force_.publish(report.total_reaction(), now());  // zero if the step was refused
+    feedback_.publish({report.total_reaction(), report.status}, now());
 }
 
 inline void SoftTissue::show_all() noexcept {

@@ -95,7 +95,8 @@ struct StepReport {
     /// What the layers leave out: the largest residual force on a free vertex that this step did not update, beside one
     /// that it did, and the sum of these forces [N]. While the tools move, the sum is the part of their force on the
     /// membrane that reaches neither foundation nor pinned vertices; beside vertices that have come to rest nothing is
-    /// counted. Both are 0 if the queue has all vertices.
+    /// counted. Both are 0 while the queue has all vertices. Once a contact has ended it has none: then the forces on
+    /// vertices at rest remain, below the tolerance.
     Scalar residual_beyond = 0;
     Vector3<Scalar> unsupported = Vector3<Scalar>::Zero();
     ///@}
