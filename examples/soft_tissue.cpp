@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 //
 // An engine presses a membrane (soft_tissue.hpp), pauses, saves, loads, teleports and resets it, and is refused a
-// position; a thread of the membrane's own makes its ticks at 1 kHz. The engine's sphere has a seam: two vertices at each of its positions.
+// position; a thread of the membrane's own makes its ticks at 1 kHz. The engine's sphere has a seam: two vertices at
+// each of its positions.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
