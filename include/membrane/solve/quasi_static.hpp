@@ -171,6 +171,7 @@ class QuasiStaticSolver {
         const auto moved = moved_.items();
         return std::find(moved.begin(), moved.end(), v) != moved.end();
     }
+    void keep_fixed_positions(const PointsRef<Scalar>& x) noexcept;
     [[nodiscard]] StepReport<Scalar> refuse_step(StepStatus status) noexcept;
 
     [[no_unique_address]] Rule rule_;
@@ -453,12 +454,18 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
         report_.converged = report_.converged || (felt > 0 && largest <= options_.relative_tolerance * felt);
     }
     complete_ = !report_.out_of_time && !active_.truncated();
+    keep_fixed_positions(x);
+    state_.end_step();
+}
+
+// For `seed_beside_moved_pins` in the next step.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+void QuasiStaticSolver<Scalar, Rule>::keep_fixed_positions(const PointsRef<Scalar>& x) noexcept {
     std::swap(last_prescribed_, state_.prescribed);
     for (const auto fixed : {std::span<const Index>(pins_.items()), last_prescribed_.items()}) {
         for (const Index v : fixed) fixed_at_.col(v) = point(x, v);
     }
     pins_known_ = true;
-    state_.end_step();
 }
 
 // The forces on the free neighbours of the active vertices, which are among the vertices loaded: the caller's positions
