@@ -32,7 +32,7 @@ class SoftTissue {
     using Tool = membrane::Tool<float>;
     struct Feedback {
         membrane::Vector3<float> force = membrane::Vector3<float>::Zero();  ///< on the tool [N]; zero if refused
-        membrane::StepStatus status = membrane::StepStatus::advanced;       ///< why the step was refused, `to_string`
+        membrane::StepStatus status = membrane::StepStatus::advanced;       ///< or why the step was refused
     };
 
     /// Vertices at one position, as along a seam of the texture, are one vertex of the membrane.
