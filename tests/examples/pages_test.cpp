@@ -605,7 +605,6 @@ TEST_CASE_METHOD(Touched, "pages: two loops") {
 }
 
 TEST_CASE_METHOD(Touched, "pages: snapshot") {
-    membrane::ForceLimiter limit(membrane::devices::touch);
     std::vector<double> forces;
     const auto play = [&](int ticks) {
         for (int i = 0; i < ticks; ++i) {
@@ -614,18 +613,18 @@ TEST_CASE_METHOD(Touched, "pages: snapshot") {
             contact = tracker.update(tree, x, tool);
             const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
             tree.refit(x, report.moved);
-            forces.push_back(limit(feel({tool, contact, report}), tool.time, ++steps).norm());
+            forces.push_back(feel({tool, contact, report}).norm());
+            ++steps;
         }
     };
     play(10);
     // [snapshot]
-    std::vector<std::byte> buffer(
-        membrane::snapshot_capacity(solver, tracker, limit, x, tool, steps));                   // before the loop
-    const auto size = membrane::save_snapshot(buffer, solver, tracker, limit, x, tool, steps);  // at any tick
+    std::vector<std::byte> buffer(membrane::snapshot_capacity(solver, tracker, x, tool, steps));  // before the loop
+    const auto size = membrane::save_snapshot(buffer, solver, tracker, x, tool, steps);           // at any tick
     // ... later, or in another program:
     const auto go_back = [&] {
         const auto snapshot = std::span(buffer).first(size);
-        if (!membrane::restore_snapshot(snapshot, solver, tracker, limit, x, tool, steps)) return false;
+        if (!membrane::restore_snapshot(snapshot, solver, tracker, x, tool, steps)) return false;
         tree.refit(x);
         return true;
     };
@@ -636,6 +635,32 @@ TEST_CASE_METHOD(Touched, "pages: snapshot") {
     REQUIRE(forces.size() == 90);
     CHECK(std::equal(forces.begin() + 10, forces.begin() + 50, forces.begin() + 50));
     CHECK(forces.back() > 0);
+}
+
+TEST_CASE("pages: a mesh from a file") {
+    std::istringstream file("# a square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1 4/1\n");
+    // [obj]
+    std::vector<double> coordinates;
+    std::vector<membrane::Index> corners;
+    for (std::string line, word; std::getline(file, line);) {
+        std::istringstream words(line);
+        words >> word;
+        if (word == "v") {
+            for (double c = 0; words >> c;) coordinates.push_back(c / 1000);  // in the file: millimetres
+        } else if (word == "f") {
+            std::vector<membrane::Index> face;
+            while (words >> word) face.push_back(std::stoi(word) - 1);  // "7/3/1" begins with the vertex
+            for (std::size_t k = 2; k < face.size(); ++k)
+                corners.insert(corners.end(), {face[0], face[k - 1], face[k]});
+        }
+    }
+    const auto points = Eigen::Map<membrane::Points<double>>(coordinates.data(), 3, std::ssize(coordinates) / 3);
+    const auto triangles = Eigen::Map<membrane::Triangles>(corners.data(), 3, std::ssize(corners) / 3);
+    const auto mesh = membrane::TriangleMesh(points, triangles);  // throws if it is no surface
+    // [/obj]
+    CHECK(mesh.vertex_count() == 4);
+    CHECK(mesh.triangle_count() == 2);
+    CHECK(mesh.positions().col(2) == Eigen::Vector3d(1e-3, 1e-3, 0));
 }
 
 TEST_CASE("pages: meshes from formulas") {
@@ -737,7 +762,7 @@ TEST_CASE("pages: tear") {
     const auto network =
         membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 20.0, .pinned = rim});
     auto tissue = membrane::Tissue(membrane::TearableSprings(mesh, network));
-    auto solver = membrane::QuasiStaticSolver(tissue, {.layers = 12});
+    auto solver = membrane::QuasiStaticSolver(tissue, {.layers = 12, .sweeps = 4});
     auto tree = membrane::AabbTree(mesh);
     auto tear = membrane::Tearing(mesh, membrane::EnergyRelease{.toughness = 1.4e3, .thickness = 12e-6});
     auto x = mesh.positions();
@@ -990,15 +1015,35 @@ TEST_CASE_METHOD(Touched, "pages: forceps") {
 
 TEST_CASE_METHOD(Touched, "pages: status") {
     membrane::ScriptedDevice<double> device({{.time = 0}}, {.tick = 1e-3});
-    // [status]
-    const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
-    if (report.status != membrane::StepStatus::advanced) {
-        device.write({});  // no force, which no limit delays; x is unchanged, and the next valid input goes on from it
-    } else {
-        device.write(feel({tool, contact, report}));  // converged or not: the state of this tick
+    membrane::ForceLimiter limit(membrane::devices::touch);
+    const auto tick = [&] {
+        tool.time += dt;
+        // [status]
+        const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+        membrane::Vector3<double> force = membrane::Vector3<double>::Zero();  // if refused; x is unchanged then
+        if (report.status == membrane::StepStatus::advanced) {
+            force = feel({tool, contact, report});  // converged or not: the state of this tick
+            ++steps;
+        }
+        device.write(limit(force, tool.time, steps));  // in every tick: zero passes at once
+        // [/status]
+        return device.force().norm();
+    };
+    double full = 0;
+    for (int i = 0; i < 300; ++i) full = tick();
+    REQUIRE(full > 0);
+    const auto still = tool.position;
+    tool.position.x() = std::numeric_limits<double>::quiet_NaN();
+    for (int i = 0; i < 30; ++i) CHECK(tick() == 0);
+    tool.position = still;
+    const double in_a_tick = limit.device().peak_force / 0.02 * dt;  // the slew limit
+    double last = 0;
+    for (int i = 0; i < 300; ++i) {
+        const double now = tick();
+        CHECK(now - last <= 1.001 * in_a_tick);
+        last = now;
     }
-    // [/status]
-    CHECK(device.force().norm() > 0);
+    CHECK(last == full);
 }
 
 TEST_CASE_METHOD(Touched, "pages: rigid body") {

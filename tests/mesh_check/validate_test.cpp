@@ -557,9 +557,32 @@ TEST_CASE("the work of validation is bounded", "[mesh]") {
     const MeshReport one_of_a_kind = validate(heap.x, heap.triangles, {.tolerance = 0.0, .max_findings_per_kind = 1});
     CHECK(one_of_a_kind.findings.size() <= 2);
     CHECK_THAT(to_string(one_of_a_kind), ContainsSubstring("components, one with triangle 0, one with triangle 1\n"));
-    const std::string summary =
-        "several components: " + std::to_string(heap.triangle_count()) + "; make a mesh of each";
+    const std::string summary = "several components: " + std::to_string(heap.triangle_count()) + "; repair with .weld";
     CHECK_THAT(to_string(one_of_a_kind), ContainsSubstring(summary));
+}
+
+TEST_CASE("along a seam that is a little open, the remedy is to weld", "[mesh][bad]") {
+    const auto sphere = icosphere<double>({.radius = 10e-3, .subdivisions = 2});
+    const double edge = validate(sphere.positions(), sphere.triangles()).facts.mean_edge;
+    for (const double offset : {1e-9, 1e-6, 1e-5, 1e-4, 9e-4}) {
+        CAPTURE(offset);
+        Surface<double> halves = test::surface_of(sphere);
+        std::vector<Index> copy(static_cast<std::size_t>(sphere.vertex_count()), no_index);
+        for (Index f = 0; f < sphere.triangle_count(); ++f) {
+            double y = 0;
+            for (Index k = 0; k < 3; ++k) y += sphere.positions()(1, sphere.triangles()(k, f));
+            for (Index k = 0; y > 0 && k < 3; ++k) {
+                const Index v = sphere.triangles()(k, f);
+                Index& other = copy[static_cast<std::size_t>(v)];
+                const Vector3<double> beside = point(sphere.positions(), v) + offset * edge * Vector3<double>::UnitX();
+                if (other == no_index) other = halves.add(beside);
+                halves.triangles(k, f) = other;
+            }
+        }
+        const MeshReport report = validate(halves.x, halves.triangles);
+        CHECK(report.count(MeshDefect::nearly_coincident_vertices) > 0);
+        CHECK_THAT(to_string(report), ContainsSubstring(".weld and a distance"));
+    }
 }
 
 TEST_CASE("a vertex beside an edge is on it within the tolerance, to any side", "[mesh][bad]") {

@@ -37,7 +37,8 @@ namespace membrane {
 /// Options of `validate`.
 struct ValidateOptions {
     /// Vertices at most this far from each other or from a border edge count as unjoined [m]. Default: the larger of a
-    /// millionth of the mean edge and four times the spacing of floating-point numbers at the largest coordinate.
+    /// millionth of the mean edge and four times the spacing of floating-point numbers at the largest coordinate; for
+    /// two vertices of the border also a thousandth of the shortest border edge at them.
     std::optional<double> tolerance{};
 
     /// Maximum number of findings listed for each kind. All are counted, except self-intersections: their search stops
@@ -213,6 +214,38 @@ bool check_volumes(const CheckedMesh& mesh, const SurfaceParts& parts, std::int6
     });
 }
 
+/// For each vertex the shortest border edge at it [m]; zero inside.
+inline std::vector<double> border_edges(const CheckedMesh& mesh, std::span<const std::vector<HalfEdge>> borders) {
+    std::vector<double> shortest(static_cast<std::size_t>(mesh.x.cols()), 0);
+    for (const auto& line : borders) {
+        for (const HalfEdge& side : line) {
+            if (!mesh.finite[static_cast<std::size_t>(side.triangle)]) continue;
+            const double length = norm<double>(point(mesh.x, side.second) - point(mesh.x, side.first));
+            for (const Index v : {side.first, side.second}) {
+                double& other = shortest[static_cast<std::size_t>(v)];
+                other = other > 0 ? (std::min)(other, length) : length;
+            }
+        }
+    }
+    return shortest;
+}
+
+/// Finds vertices within `tolerance` of each other, and those along a seam that is open by up to a thousandth of the
+/// border's edges, `edge`. Returns whether the search is complete.
+template <class Found>
+bool check_near_vertices(const CheckedMesh& mesh, const CoincidentVertices& vertices, const std::vector<double>& edge,
+                         double tolerance, std::int64_t effort, Found found) {
+    const auto expected = [&](double edge_length) { return (std::max)(tolerance, 1e-3 * edge_length); };
+    const double largest = expected(*std::max_element(edge.begin(), edge.end()));
+    return vertices.for_each_pair(largest, effort, [&](Index v, Index w) {
+        const double distance = norm<double>(point(mesh.x, v) - point(mesh.x, w));
+        const double apart = expected((std::min)(edge[static_cast<std::size_t>(v)], edge[static_cast<std::size_t>(w)]));
+        if (distance > apart) return;
+        found(MeshDefect::nearly_coincident_vertices, {v, w}, {}, "vertices ", v, " and ", w, " are ", distance,
+              " [m] apart, expected more than ", apart);
+    });
+}
+
 /// The checks that need distances; returns the kinds of the searches that are not complete.
 template <class Found>
 std::vector<MeshDefect> check_geometry(const CheckedMesh& mesh, const SurfaceParts& parts,
@@ -229,21 +262,19 @@ std::vector<MeshDefect> check_geometry(const CheckedMesh& mesh, const SurfacePar
                   " are at one place");
         }
     }
-    std::int64_t left = effort;
     std::vector<MeshDefect> unfinished;
     const auto note = [&](MeshDefect defect, bool complete) {
         if (!complete) unfinished.push_back(defect);
     };
-    const bool all_pairs = coincident.for_each_pair(tolerance, left, [&](Index v, Index w) {
-        found(MeshDefect::nearly_coincident_vertices, {v, w}, {}, "vertices ", v, " and ", w, " are ",
-              norm<double>(point(mesh.x, v) - point(mesh.x, w)), " [m] apart, expected more than ", tolerance);
-    });
-    note(MeshDefect::nearly_coincident_vertices, all_pairs);
+    // A tolerance that the caller gives holds along seams as well.
+    const std::vector<double> edge =
+        options.tolerance ? std::vector<double>(representative.size(), 0) : border_edges(mesh, borders);
+    note(MeshDefect::nearly_coincident_vertices, check_near_vertices(mesh, coincident, edge, tolerance, effort, found));
     const std::vector<Index> with_area = check_triangles(mesh, found);
     note(MeshDefect::t_junction, check_t_junctions(mesh, borders, tolerance, effort, found));
     note(MeshDefect::nested_components, check_volumes(mesh, parts, effort, found));
     Index meetings = 0;
-    left = effort;
+    std::int64_t left = effort;
     const auto meet = [&](Index f, Index g) {
         found(MeshDefect::self_intersection, {}, {f, g}, "triangles ", f, " and ", g, " meet");
         if (++meetings == options.max_findings_per_kind) left = 0;
