@@ -108,7 +108,7 @@ struct Errors {
 
 /// Without the correction and with it.
 std::pair<Errors, Errors> errors(const Mesh& mesh, double edge) {
-    const int count = cases(10, 16);
+    const int count = cases(5, 16);
     std::pair<Errors, Errors> found;
     test::Random random(7);
     const Disc disc{mesh};

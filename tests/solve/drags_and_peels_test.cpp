@@ -155,7 +155,7 @@ TEMPLATE_TEST_CASE(
     "and replay to the bit",
     "[cohesion][friction]", TEST_SCALARS) {
     int let_go = 0, held = 0, slipped = 0;
-    for (int seed = 1; seed <= cases(40, 2000); ++seed) {
+    for (int seed = 1; seed <= cases(20, 2000); ++seed) {
         CAPTURE(seed);
         Loop<TestType> loop(seed);
         const int ticks = cases_are_slow ? 100 : 500;

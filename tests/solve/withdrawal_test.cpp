@@ -318,7 +318,7 @@ TEST_CASE("a membrane with a free border comes back from what has gone round it"
     const std::vector<Scene> scenes{Scene(square(), false), Scene(folded_square(-0.7), false),
                                     Scene(folded_square(0.7), false),
                                     Scene(spherical_cap<double>({.rings = 8}), false)};
-    for (int seed = 1; seed <= cases(240, 2000); ++seed) {
+    for (int seed = 1; seed <= cases(120, 2000); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
         const Scene& fresh = scenes[static_cast<std::size_t>(seed) % scenes.size()];
@@ -344,7 +344,7 @@ TEST_CASE("a membrane with a free border comes back from what has gone round it"
 // gone through it, and pulls a corner along.
 TEST_CASE("a shaft dragged slowly over a free border slides off, and the membrane comes back", "[withdrawal]") {
     const Scene fresh = free_sheet();
-    const int runs = cases(16, 1000);
+    const int runs = cases(8, 1000);
     int caught = 0;
     for (int seed = 1; seed <= runs; ++seed) {
         CAPTURE(seed);
@@ -363,7 +363,7 @@ TEST_CASE("no shaft that is dragged over a free border is left with the membrane
 // One or two in a hundred are not at rest after a second, one in two hundred has its axis inside until it is withdrawn.
 TEST_CASE("a shaft thinner than an edge, two edges deep, stays outside a closed surface and leaves it",
           "[withdrawal]") {
-    const int runs = cases(40, 2000);
+    const int runs = cases(20, 2000);
     int moving = 0, inside = 0;
     for (int seed = 1; seed <= runs; ++seed) {
         CAPTURE(seed);
