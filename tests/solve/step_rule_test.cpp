@@ -81,8 +81,8 @@ TEMPLATE_TEST_CASE("a contact stiffens a block along its normal alone", "[rule]"
 TEMPLATE_TEST_CASE("a safe step that would not be safe is refused by name", "[rule][bad]", SafeStep, BlockStep) {
     const auto refused = [](double omega) { return test::refusal([&] { TestType{.omega = omega}.validate(); }); };
     for (const double omega : {1e-9, 0.5, 1.0, 1.9, 1.999}) CHECK(refused(omega) == "");
-    const std::string name = (std::is_same_v<TestType, SafeStep> ? std::string("SafeStep") : "BlockStep") +
-                             ": omega must lie between 0 and 2, got ";
+    std::string name = std::is_same_v<TestType, SafeStep> ? "SafeStep" : "BlockStep";
+    name += ": omega must lie between 0 and 2, got ";
     CHECK(refused(0) == name + "0");
     CHECK(refused(2) == name + "2");
     CHECK(refused(-1) == name + "-1");

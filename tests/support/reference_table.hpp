@@ -40,7 +40,7 @@ class ReferenceRow {
 };
 
 inline std::vector<ReferenceRow> reference_table(const std::string& file_name) {
-    std::ifstream file(std::string(MEMBRANE_TEST_DATA) + "/" + file_name);
+    std::ifstream file(MEMBRANE_TEST_DATA "/" + file_name);
     std::vector<std::string> names;
     std::vector<ReferenceRow> rows;
     for (std::string line; std::getline(file, line);) {
