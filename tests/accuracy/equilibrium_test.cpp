@@ -20,6 +20,7 @@
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/contact_newton.hpp"
+#include "support/meshes.hpp"
 #include "support/newton.hpp"
 #include "support/random.hpp"
 #include "support/reference_table.hpp"
@@ -354,6 +355,51 @@ TEST_CASE("a tool that is deeper than it is thick comes from outside", "[equilib
         const auto rest = sphere.rest({}, press(stroke.at(1), stroke.contact(sphere)));
         check_pressed(rest, sphere, {stroke.at(1)});
         CHECK(rest.reactions[0].z() > 0.05);
+    }
+}
+
+TEST_CASE("a ball on slender triangles around a pole: safe steps come to rest where Newton's method does",
+          "[equilibrium]") {
+    constexpr Index rings = 14, slices = 36;
+    test::Surface<double> dome;
+    dome.add(Point(0, 0, 8e-3));
+    for (Index i = 1; i <= rings; ++i) {
+        for (Index j = 0; j < slices; ++j) {
+            const double down = 0.8 * i / rings, around = 2 * std::numbers::pi * j / slices;
+            dome.add(8e-3 *
+                     Point(std::sin(down) * std::cos(around), std::sin(down) * std::sin(around), std::cos(down)));
+        }
+    }
+    const auto at = [](Index i, Index j) { return i == 0 ? 0 : 1 + (i - 1) * slices + j % slices; };
+    for (Index i = 0; i < rings; ++i) {
+        for (Index j = 0; j < slices; ++j) {
+            if (i > 0) dome.add(at(i, j), at(i + 1, j), at(i, j + 1));
+            dome.add(at(i, j + 1), at(i + 1, j), at(i + 1, j + 1));
+        }
+    }
+    const auto mesh = dome.mesh();
+    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0, .pinned = border(mesh)});
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = 8.0, .damping = 0.02});
+    for (const double depth : {0.4e-3, 0.7e-3}) {
+        CAPTURE(depth);
+        QuasiStaticSolver solver(network, {.layers = 8, .sweeps = 3}, SafeStep());
+        AabbTree<double> tree(mesh);
+        ContactTracker<double> tracker(mesh);
+        Points<double> x = mesh.positions();
+        Tool<double> tool{.position = {0.5e-3, 0, 0}, .radius = 1.5e-3};
+        Contact<double> contact;
+        StepReport<double> report;
+        for (int tick = 0; tick < 1500; ++tick) {
+            tool.position.z() = 9.6e-3 - (std::min)(tick / 1000.0, 1.0) * (depth + 0.1e-3);
+            contact = tracker.update(tree, x, tool);
+            report = solver.step(x, 1e-3, network, foundation, press(tool, contact));
+            tree.refit(x, report.moved);
+        }
+        CHECK(report.residual < 1e-6);
+        const double force = norm(report.reactions[0]);
+        const auto rest = equilibrium(x, mesh, network, foundation, {}, press(tool, contact));
+        REQUIRE(rest.converged);
+        CHECK(force == Approx(norm(rest.reactions[0])).epsilon(1e-4));
     }
 }
 

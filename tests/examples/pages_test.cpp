@@ -800,7 +800,10 @@ TEST_CASE("pages: a flap that forceps tear") {
     while (path.size() < 10) path.push_back(tear.surface().nearest_in_direction(path.back(), {0, 1, 0}));
     for (const auto& event : tear.cut_along(path, x)) follow(event, tissue, solver, tree, tracker, grasper);
 
-    std::vector<membrane::Vector3<double>> torn;  // where it has torn, on the membrane at rest [m]
+    std::vector<std::vector<membrane::Vector3<double>>> torn;  // a line for each tip, on the membrane at rest [m]
+    for (const auto& tip : tear.tips()) {
+        torn.push_back({membrane::point(tear.surface().rest_positions(), tip.vertex)});
+    }
     const auto tick = [&](const membrane::Tool<double>& tool) {
         const auto contact = tracker.update(tree, x, tool);
         const auto grasp = grasper.update(contact, x, tool);
@@ -808,9 +811,12 @@ TEST_CASE("pages: a flap that forceps tear") {
             solver.step(x, dt, tissue, support, press(tool, contact, grasp), pull(tool, grasp), tear.ligaments());
         const auto held = std::span<const membrane::Index>(grasp.corners).first(grasp.holding() ? 3 : 0);
         for (const auto& event : tear.update(x, dt, tissue, support, held)) {
-            if (event.split.vertex != membrane::no_index)
-                torn.push_back(membrane::point(tear.surface().rest_positions(), event.split.vertex));
             follow(event, tissue, solver, tree, tracker, grasper);
+        }
+        for (const auto& tip : tear.tips()) {
+            const auto at = membrane::point(tear.surface().rest_positions(), tip.vertex);
+            const auto line = std::ranges::min_element(torn, {}, [&](const auto& l) { return norm(l.back() - at); });
+            if (line->back() != at) line->push_back(at);
         }
         tree.refit(x, report.moved);
         return report.reactions[0] + report.reactions[1];  // on the forceps [N]
@@ -828,8 +834,18 @@ TEST_CASE("pages: a flap that forceps tear") {
     CHECK(grasper.update(tracker.update(tree, x, tool), x, tool).holding());
     CHECK(largest > 1e-3);
     CHECK(largest < 0.1);
-    CHECK_FALSE(torn.empty());
+    REQUIRE(torn.size() == 2);
+    CHECK(torn[0].size() + torn[1].size() > 2);
+    double length = 0;
+    for (const auto& line : torn) {
+        for (std::size_t i = 1; i < line.size(); ++i) {
+            const double step = (line[i] - line[i - 1]).norm();
+            CHECK(step < 2 * edge);  // it does not change between the tips
+            length += step;
+        }
+    }
     CHECK(tear.torn_length() > edge);
+    CHECK(length > 0.5 * tear.torn_length());
 }
 
 TEST_CASE("pages: tear_reset") {

@@ -95,13 +95,14 @@ inline constexpr std::array<DefectText, mesh_defect_count> defect_texts{{
     {"cap", "turn its longest edge, or remesh"},
     {"isolated vertex", "repair with .drop_isolated"},
     {"missing triangle", "add the triangle, if the surface is meant to be closed"},
-    {"T-junction", "cut the triangle at that edge in two"},
+    {"T-junction", "repair with .weld if vertices nearly coincide there, else cut the triangle at that edge in two"},
     {"several components",
      "repair with .weld if they meet along a seam; make a mesh of each, if they are not meant to be one membrane"},
     {"no volume", "leave out one of the two sides"},
     {"inward", "repair with .flip_inward, or the tool works from inside"},
     {"nested components", "leave out the inner one, if it is not meant"},
-    {"self-intersection", "remesh, or move the vertices apart"},
+    {"self-intersection",
+     "repair with .weld if vertices coincide there, or nearly, else remesh, or move the vertices apart"},
 }};
 
 }  // namespace detail
