@@ -220,7 +220,7 @@ inline std::vector<double> border_edges(const CheckedMesh& mesh, std::span<const
     for (const auto& line : borders) {
         for (const HalfEdge& side : line) {
             if (!mesh.finite[static_cast<std::size_t>(side.triangle)]) continue;
-            const double length = norm<double>(point(mesh.x, side.second) - point(mesh.x, side.first));
+            const auto length = norm<double>(point(mesh.x, side.second) - point(mesh.x, side.first));
             for (const Index v : {side.first, side.second}) {
                 double& other = shortest[static_cast<std::size_t>(v)];
                 other = other > 0 ? (std::min)(other, length) : length;
@@ -238,7 +238,7 @@ bool check_near_vertices(const CheckedMesh& mesh, const CoincidentVertices& vert
     const auto expected = [&](double edge_length) { return (std::max)(tolerance, 1e-3 * edge_length); };
     const double largest = expected(*std::max_element(edge.begin(), edge.end()));
     return vertices.for_each_pair(largest, effort, [&](Index v, Index w) {
-        const double distance = norm<double>(point(mesh.x, v) - point(mesh.x, w));
+        const auto distance = norm<double>(point(mesh.x, v) - point(mesh.x, w));
         const double apart = expected((std::min)(edge[static_cast<std::size_t>(v)], edge[static_cast<std::size_t>(w)]));
         if (distance > apart) return;
         found(MeshDefect::nearly_coincident_vertices, {v, w}, {}, "vertices ", v, " and ", w, " are ", distance,
