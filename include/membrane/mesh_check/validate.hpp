@@ -214,32 +214,31 @@ bool check_volumes(const CheckedMesh& mesh, const SurfaceParts& parts, std::int6
     });
 }
 
-/// For each vertex the shortest border edge at it [m]; zero inside.
-inline std::vector<double> border_edges(const CheckedMesh& mesh, std::span<const std::vector<HalfEdge>> borders) {
-    std::vector<double> shortest(static_cast<std::size_t>(mesh.x.cols()), 0);
+/// For each vertex how near another counts as unjoined [m]: within `tolerance`, and on a border within a thousandth of
+/// its shortest border edge, so that a seam which is a little open is found.
+inline std::vector<double> seam_widths(const CheckedMesh& mesh, std::span<const std::vector<HalfEdge>> borders,
+                                       double tolerance) {
+    std::vector<double> edge(static_cast<std::size_t>(mesh.x.cols()), std::numeric_limits<double>::infinity());
     for (const auto& line : borders) {
         for (const HalfEdge& side : line) {
             if (!mesh.finite[static_cast<std::size_t>(side.triangle)]) continue;
             const auto length = norm<double>(point(mesh.x, side.second) - point(mesh.x, side.first));
-            for (const Index v : {side.first, side.second}) {
-                double& other = shortest[static_cast<std::size_t>(v)];
-                other = other > 0 ? (std::min)(other, length) : length;
-            }
+            for (double* at :
+                 {&edge[static_cast<std::size_t>(side.first)], &edge[static_cast<std::size_t>(side.second)]})
+                *at = (std::min)(*at, length);
         }
     }
-    return shortest;
+    for (double& width : edge) width = std::isinf(width) ? tolerance : (std::max)(tolerance, 1e-3 * width);
+    return edge;
 }
 
-/// Finds vertices within `tolerance` of each other, and those along a seam that is open by up to a thousandth of the
-/// border's edges, `edge`. Returns whether the search is complete.
+/// Finds vertices that are nearer to each other than both their `widths`. Returns whether the search is complete.
 template <class Found>
-bool check_near_vertices(const CheckedMesh& mesh, const CoincidentVertices& vertices, const std::vector<double>& edge,
-                         double tolerance, std::int64_t effort, Found found) {
-    const auto expected = [&](double edge_length) { return (std::max)(tolerance, 1e-3 * edge_length); };
-    const double largest = expected(*std::max_element(edge.begin(), edge.end()));
-    return vertices.for_each_pair(largest, effort, [&](Index v, Index w) {
+bool check_near_vertices(const CheckedMesh& mesh, const CoincidentVertices& vertices, const std::vector<double>& widths,
+                         std::int64_t effort, Found found) {
+    return vertices.for_each_pair(*std::max_element(widths.begin(), widths.end()), effort, [&](Index v, Index w) {
         const auto distance = norm<double>(point(mesh.x, v) - point(mesh.x, w));
-        const double apart = expected((std::min)(edge[static_cast<std::size_t>(v)], edge[static_cast<std::size_t>(w)]));
+        const double apart = (std::min)(widths[static_cast<std::size_t>(v)], widths[static_cast<std::size_t>(w)]);
         if (distance > apart) return;
         found(MeshDefect::nearly_coincident_vertices, {v, w}, {}, "vertices ", v, " and ", w, " are ", distance,
               " [m] apart, expected more than ", apart);
@@ -267,9 +266,9 @@ std::vector<MeshDefect> check_geometry(const CheckedMesh& mesh, const SurfacePar
         if (!complete) unfinished.push_back(defect);
     };
     // A tolerance that the caller gives holds along seams as well.
-    const std::vector<double> edge =
-        options.tolerance ? std::vector<double>(representative.size(), 0) : border_edges(mesh, borders);
-    note(MeshDefect::nearly_coincident_vertices, check_near_vertices(mesh, coincident, edge, tolerance, effort, found));
+    const auto widths = options.tolerance ? std::vector<double>(representative.size(), tolerance)
+                                          : seam_widths(mesh, borders, tolerance);
+    note(MeshDefect::nearly_coincident_vertices, check_near_vertices(mesh, coincident, widths, effort, found));
     const std::vector<Index> with_area = check_triangles(mesh, found);
     note(MeshDefect::t_junction, check_t_junctions(mesh, borders, tolerance, effort, found));
     note(MeshDefect::nested_components, check_volumes(mesh, parts, effort, found));
