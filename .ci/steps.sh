@@ -3,39 +3,39 @@
 
 exec < /dev/null  # no input from a terminal
 
-current=packages begun=0 names=() seconds=()
+passed=$(mktemp) current="installing packages" beside=
 
-# ended: the step that was begun last, and how long it took.
-ended() {
-    names+=("$current")
-    seconds+=("$((SECONDS - begun))")
-    begun=$SECONDS
+stopped() {
+    if [[ -n $beside ]]; then kill -- "-$beside" 2> /dev/null || true; fi
+    printf '\n%s\n\nFAILED after %d s: %s\n' "$(cat "$passed")" "$SECONDS" "$current"
+    rm "$passed"
 }
-
-# shares: each step's part of the time.
-shares() {
-    local i
-    printf '\n'
-    for i in "${!names[@]}"; do
-        printf '%5d s %3d %%  %s\n' "${seconds[i]}" "$((100 * seconds[i] / (SECONDS > 0 ? SECONDS : 1)))" "${names[i]}"
-    done
-}
-
-failed() {
-    ended
-    shares
-    printf '\nFAILED after %d s: %s\n' "$SECONDS" "$current"
-}
-trap failed EXIT
+trap stopped EXIT
 
 # step NAME COMMAND...
 step() {
-    ended
+    local begun=$SECONDS
     current=$1
-    printf '\n=== %d. %s\n' "${#names[@]}" "$current"
-    shift
-    "$@"
-    printf '=== %s: passed in %d s\n' "$current" "$((SECONDS - begun))"
+    printf '\n=== %s\n' "$current"
+    "${@:2}"
+    printf '%5d s  %s\n' "$((SECONDS - begun))" "$1" | tee --append "$passed"
+}
+
+# side_by_side STEPS STEPS: two functions of steps at the same time, as hardly any step keeps all cores busy. What the
+# second one prints follows after all of the first.
+side_by_side() {
+    local log
+    log=$(mktemp)
+    set -m  # makes it and all its children a group, which can be killed
+    ("$2") > "$log" 2>&1 &
+    beside=$!
+    set +m
+    "$1"
+    current="the last step above"
+    if wait "$beside"; then beside=; fi
+    cat "$log"
+    rm "$log"
+    [[ -z $beside ]]
 }
 
 # sanitized [CMAKE ARGUMENT...]: the tests of code with its own memory access, with assertions and sanitizers.
@@ -47,8 +47,7 @@ sanitized() {
 
 # all_passed: after the last step.
 all_passed() {
-    ended
     trap - EXIT
-    shares
-    printf '\nAll %d steps passed in %d s.\n' "$((${#names[@]} - 1))" "$SECONDS"
+    printf '\n%s\n\nAll %d steps passed in %d s.\n' "$(cat "$passed")" "$(wc --lines < "$passed")" "$SECONDS"
+    rm "$passed"
 }
