@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/solve/explicit_euler.hpp>
-#include <membrane/solve/largest_eigenvalue.hpp>
 
 #include <optional>
 
@@ -27,7 +26,7 @@ struct Scene {
         network.emplace(mesh(), membrane::LinearSpring{},
                         membrane::NetworkOptions<double>{.stiffness = spring, .mass = 1.0});
         for (Index v = 0; v < 162; ++v) {
-            largest_block = std::max(largest_block, membrane::largest_eigenvalue_at<double>(*network, v, rest));
+            largest_block = std::max(largest_block, membrane::largest_eigenvalue(network->hessian(v, rest)));
         }
         largest_block += volume->stiffness(0);
         find_largest();

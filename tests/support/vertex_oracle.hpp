@@ -5,6 +5,8 @@
 
 #include <membrane/solve/vertex_update.hpp>
 
+#include "support/vertex_energy.hpp"
+
 /// The update of one vertex, without lanes: what a pack does to each of its vertices.
 ///
 ///     const auto state = test::state_of<Rule>(scene, v);
@@ -17,7 +19,7 @@ auto state_of(const Scene& scene, membrane::Index v) {
     using Scalar = std::remove_cvref_t<decltype(scene.dt)>;
     membrane::VertexState<Scalar> state;
     if constexpr (requires { requires Rule::needs_majoriser; }) {
-        static_cast<membrane::EnergyMajoriser<Scalar>&>(state) = scene.network.majoriser(v, scene.x);
+        static_cast<membrane::EnergyMajoriser<Scalar>&>(state) = majoriser(scene.network, v, scene.x);
     } else {
         const auto springs = scene.network.force_on(v, scene.x);
         state.force = springs.force;
@@ -46,7 +48,7 @@ bool update(const Scene& scene, membrane::Index v, const Rule& rule, Scalar tole
     const auto others = membrane::non_network_force(scene, v);
     const auto rises = [&] {
         const Scalar work = dot(others.force, by) - others.stiffness * squared_norm(by) / 2;
-        const auto energy = scene.network.energy_change(v, by, scene.x);
+        const auto energy = energy_change(scene.network, v, by, scene.x);
         return !(energy.change <= work + 16 * std::numeric_limits<Scalar>::epsilon() * energy.size);
     };
     if (membrane::is_descent_rule<Rule> && !scene.network.never_stiffens) {

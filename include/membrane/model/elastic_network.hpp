@@ -53,7 +53,7 @@ struct EnergyRemainder {
 
 /// Force on a vertex and an upper bound of the energy: for a displacement d of length up to rho the energy is at most
 /// E - force . d + d . (stiffness I - stiffness_reduction / (1 + rho / size)) d / 2 + remainder, see
-/// `MassSpringNetwork::majoriser`.
+/// `CurvedSum`.
 template <Number Scalar>
 struct EnergyMajoriser {
     Vector3<Scalar> force = Vector3<Scalar>::Zero();              ///< [N]
@@ -76,35 +76,14 @@ struct EnergyChange {
     }
 };
 
-/// The elastic elements of a membrane: springs, or springs and others. Beyond the signatures: all forces derive from
-/// one energy; `neighbours(v)` lists, by their `other`, all vertices whose position changes the force on `v`; the bound
-/// of `EnergyMajoriser` holds for every displacement if the network `never_stiffens`, else as far as its
-/// remainder is known.
+/// The elastic elements of a membrane: a `MassSpringNetwork`, a `TearableSprings` or a `Tissue` of this scalar. What a
+/// user adds is a law of the springs (`SpringLaw`) or an `Element` of a tissue.
 template <class Network, class Scalar>
 concept ElasticNetwork = Real<Scalar> && std::same_as<typename Network::Scalar, Scalar> &&
-    requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& displacement) {
-    { Network::never_stiffens } -> std::convertible_to<bool>;
-    { network.vertex_count() }
-    noexcept->std::same_as<Index>;
-    { network.pinned(v) }
-    noexcept->std::same_as<bool>;
-    { network.has_masses() }
-    noexcept->std::same_as<bool>;
-    { network.mass(v) }
-    noexcept->std::same_as<Scalar>;
-    { network.viscosity(v) }
-    noexcept->std::same_as<Scalar>;
-    { network.neighbours(v)[0].other } -> std::convertible_to<Index>;
-    { network.force_on(v, x) }
-    noexcept->std::same_as<VertexForce<Scalar>>;
-    { network.majoriser(v, x) }
-    noexcept->std::same_as<EnergyMajoriser<Scalar>>;
-    { network.hessian(v, x) }
-    noexcept->std::same_as<Symmetric3<Scalar>>;
-    { network.energy_change(v, displacement, x) }
-    noexcept->std::same_as<EnergyChange<Scalar>>;
-    { network.force_tolerance() }
-    noexcept->std::same_as<Scalar>;
+    requires(const Network& network, Index v) {
+    network.law();
+    network.springs_of(v);
+    network.neighbours(v);
 };
 
 namespace detail {
@@ -138,102 +117,6 @@ struct NegligibleForce {
     Scalar force = 0;               ///< [N]
 };
 
-template <class Network, class Scalar>
-consteval bool check_elastic_network() noexcept {  // NOLINT(readability-function-size): a sentence for each requirement
-    static_assert(
-        requires { requires std::same_as<typename Network::Scalar, Scalar>; },
-        "ElasticNetwork: must have Scalar, the scalar of the solver");
-    static_assert(
-        requires {
-            { Network::never_stiffens } -> std::convertible_to<bool>;
-        },
-        "ElasticNetwork: must have static constexpr bool never_stiffens");
-    static_assert(
-        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
-                 const Vector3<Scalar>& displacement) {
-            { network.vertex_count() }
-            noexcept->std::same_as<Index>;
-        },
-        "ElasticNetwork: vertex_count() const noexcept must return Index");
-    static_assert(
-        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
-                 const Vector3<Scalar>& displacement) {
-            { network.pinned(v) }
-            noexcept->std::same_as<bool>;
-        },
-        "ElasticNetwork: pinned(Index) const noexcept must return bool");
-    static_assert(
-        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
-                 const Vector3<Scalar>& displacement) {
-            { network.has_masses() }
-            noexcept->std::same_as<bool>;
-        },
-        "ElasticNetwork: has_masses() const noexcept must return bool");
-    static_assert(
-        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
-                 const Vector3<Scalar>& displacement) {
-            { network.mass(v) }
-            noexcept->std::same_as<Scalar>;
-        },
-        "ElasticNetwork: mass(Index) const noexcept must return Scalar");
-    static_assert(
-        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
-                 const Vector3<Scalar>& displacement) {
-            { network.viscosity(v) }
-            noexcept->std::same_as<Scalar>;
-        },
-        "ElasticNetwork: viscosity(Index) const noexcept must return Scalar");
-    static_assert(
-        requires(const Network& network, Index v) {
-            { network.neighbours(v)[0].other } -> std::convertible_to<Index>;
-        },
-        "ElasticNetwork: neighbours(Index) const must give a range of something with .other, an Index");
-    static_assert(
-        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
-                 const Vector3<Scalar>& displacement) {
-            { network.force_on(v, x) }
-            noexcept->std::same_as<VertexForce<Scalar>>;
-        },
-        "ElasticNetwork: force_on(Index, const ConstPointsRef<Scalar>&) const noexcept must return "
-        "VertexForce<Scalar>");
-    static_assert(
-        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
-                 const Vector3<Scalar>& displacement) {
-            { network.majoriser(v, x) }
-            noexcept->std::same_as<EnergyMajoriser<Scalar>>;
-        },
-        "ElasticNetwork: majoriser(Index, const ConstPointsRef<Scalar>&) const noexcept must return "
-        "EnergyMajoriser<Scalar>");
-    static_assert(
-        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
-                 const Vector3<Scalar>& displacement) {
-            { network.hessian(v, x) }
-            noexcept->std::same_as<Symmetric3<Scalar>>;
-        },
-        "ElasticNetwork: hessian(Index, const ConstPointsRef<Scalar>&) const noexcept must return "
-        "Symmetric3<Scalar>");
-    static_assert(
-        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
-                 const Vector3<Scalar>& displacement) {
-            { network.energy_change(v, displacement, x) }
-            noexcept->std::same_as<EnergyChange<Scalar>>;
-        },
-        "ElasticNetwork: energy_change(Index, const Vector3<Scalar>&, const ConstPointsRef<Scalar>&) const noexcept "
-        "must return EnergyChange<Scalar>");
-    static_assert(
-        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
-                 const Vector3<Scalar>& displacement) {
-            { network.force_tolerance() }
-            noexcept->std::same_as<Scalar>;
-        },
-        "ElasticNetwork: force_tolerance() const noexcept must return Scalar");
-    return ElasticNetwork<Network, Scalar>;
-}
-
 }  // namespace detail
-
-/// An `ElasticNetwork`: if a type does not satisfy it, the error names the missing requirement.
-template <class Network, class Scalar>
-concept CheckedElasticNetwork = detail::check_elastic_network<Network, Scalar>();
 
 }  // namespace membrane

@@ -135,8 +135,14 @@ MEMBRANE_INLINE void add(VertexForce<Scalar>& sum, const SpringForce<Scalar>& sp
     sum.stiffness += larger(spring.along, spring.across);
 }
 
-/// The sum for an `EnergyMajoriser` in fewer operations: the stiffness reduction as a sum of dyads, the size as a
-/// quotient.
+/// The springs' sum for an `EnergyMajoriser`, in few operations: the stiffness reduction as a sum of dyads, the size as a
+/// quotient. A spring of stiffness k, tension T and length l stores at the length l' the energy k (l' - r)^2 / 2 and a
+/// constant, r = l - T / k (or less, if it never stiffens). Of k (l'^2 - 2 r l' + r^2) / 2 only the second term is not
+/// quadratic in the position. Let u be the direction away from the other end. A displacement of the vertex by a along u
+/// and b across, of length at most rho, makes l' = sqrt((l + a)^2 + b^2) >= l + a + b^2 / (2 (l + rho)). So the energy
+/// stays below a quadratic of stiffness k along the spring and k (1 - r / (l + rho)) across it. `stiffness_reduction` is
+/// the sum of k min(r / l, 1) (I - u u^T), `size` the smallest max(l, r): with these, stiffness_reduction / (1 + rho /
+/// size) is at most the sum of k r / (l + rho) (I - u u^T).
 template <Number Scalar>
 struct CurvedSum {
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
@@ -297,7 +303,7 @@ class MassSpringNetwork {
     }
 
     ///@{
-    /// As `ElasticNetwork` requires: constants of vertex `v`. @pre `has_masses()` for `mass`
+    /// The springs of vertex `v`, and its constants. @pre `has_masses()` for `mass`
     [[nodiscard]] std::span<const SpringEnd<Scalar>> neighbours(Index v) const& noexcept { return ends_[v]; }
     void neighbours(Index) && = delete;
 
@@ -316,22 +322,8 @@ class MassSpringNetwork {
     /// Sum of the spring forces on vertex `v` at positions `x`.
     [[nodiscard]] VertexForce<Scalar> force_on(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
 
-    /// Sum of the spring forces on vertex `v`, and a bound of the energy. A spring of stiffness k, tension T and length
-    /// l stores at the length l' the energy k (l' - r)^2 / 2 and a constant, r = l - T / k (or less, if it never
-    /// stiffens). Of k (l'^2 - 2 r l' + r^2) / 2 only the second term is not quadratic in the position. Let u be the
-    /// direction away from the other end. A displacement of the vertex by a along u and b across, of length at most
-    /// rho, makes l' = sqrt((l + a)^2 + b^2) >= l + a + b^2 / (2 (l + rho)). So the energy stays below a quadratic of
-    /// stiffness k along the spring and k (1 - r / (l + rho)) across it. `stiffness_reduction` is the sum of k min(r /
-    /// l, 1) (I - u u^T), `size` the smallest max(l, r): with these, stiffness_reduction / (1 + rho / size) is at most
-    /// the sum of k r / (l + rho) (I - u u^T).
-    [[nodiscard]] EnergyMajoriser<Scalar> majoriser(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
-
     /// Hessian of the energy by the position of vertex `v` alone [N/m].
     [[nodiscard]] Symmetric3<Scalar> hessian(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
-
-    /// Change of the energy if vertex `v` is displaced by `displacement` [m].
-    [[nodiscard]] EnergyChange<Scalar> energy_change(Index v, const Vector3<Scalar>& displacement,
-                                                     const ConstPointsRef<Scalar>& x) const noexcept;
 
     /// Tension of spring `s` [N].
     [[nodiscard]] Scalar tension(Index s, const ConstPointsRef<Scalar>& x) const noexcept {
@@ -446,29 +438,10 @@ VertexForce<Scalar> MassSpringNetwork<Scalar, Law>::force_on(Index v, const Cons
 }
 
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>
-EnergyMajoriser<Scalar> MassSpringNetwork<Scalar, Law>::majoriser(Index v,
-                                                                  const ConstPointsRef<Scalar>& x) const noexcept {
-    CurvedSum<Scalar> sum;
-    for_each_force(v, x, [&](const SpringForce<Scalar>& spring) { add(sum, spring); });
-    return sum.total();
-}
-
-template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 Symmetric3<Scalar> MassSpringNetwork<Scalar, Law>::hessian(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
     Symmetric3<Scalar> block;
     for_each_force(v, x, [&](const SpringForce<Scalar>& spring) { add(block, spring); });
     return block;
-}
-
-template <Real Scalar, CheckedSpringLaw<Scalar> Law>
-EnergyChange<Scalar> MassSpringNetwork<Scalar, Law>::energy_change(Index v, const Vector3<Scalar>& displacement,
-                                                                   const ConstPointsRef<Scalar>& x) const noexcept {
-    EnergyChange<Scalar> sum;
-    for (const auto& end : springs_of(v)) {
-        const SpringElement<Scalar, Law> spring{&law_, end.stiffness, end.rest_length};
-        sum += spring.template energy_change<Scalar>({point(x, v), point(x, end.other)}, 0, displacement);
-    }
-    return sum;
 }
 
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>

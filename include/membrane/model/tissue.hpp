@@ -31,7 +31,7 @@ class Tissue {
     using Scalar = typename Springs::Scalar;       ///< that of the springs
     static constexpr bool never_stiffens = false;  ///< elements may stiffen: updates need a line search
     static constexpr bool bounds_energy =
-        Springs::never_stiffens;  ///< `majoriser` bounds the energy as far as its remainder is known
+        Springs::never_stiffens;  ///< `EnergyMajoriser` is a bound as far as its remainder is known
 
     /// Keeps copies. @throws InvalidInput for elements of another mesh than the springs'. Linear.
     explicit Tissue(const Springs& springs, const Kinds&... kinds);
@@ -70,8 +70,7 @@ class Tissue {
     void joined(Index) && = delete;
 
     ///@{
-    /// As `ElasticNetwork` requires. Masses, viscosities and pins are those of the springs. The tolerance is the
-    /// largest of springs and elements.
+    /// Masses, viscosities and pins are those of the springs. The tolerance is the largest of springs and elements.
     [[nodiscard]] std::span<const Neighbour> neighbours(Index v) const& noexcept { return neighbours_[v]; }
     void neighbours(Index) && = delete;
     [[nodiscard]] Index vertex_count() const noexcept { return springs_.vertex_count(); }
@@ -106,13 +105,9 @@ class Tissue {
     }
 
     ///@{
-    /// Sums over springs and elements at vertex `v`. Elements contribute their Hessian at `x` to the majoriser; its
-    /// `size` is that of the springs.
+    /// Sums over springs and elements at vertex `v`.
     [[nodiscard]] VertexForce<Scalar> force_on(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
-    [[nodiscard]] EnergyMajoriser<Scalar> majoriser(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
     [[nodiscard]] Symmetric3<Scalar> hessian(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
-    [[nodiscard]] EnergyChange<Scalar> energy_change(Index v, const Vector3<Scalar>& displacement,
-                                                     const ConstPointsRef<Scalar>& x) const noexcept;
     ///@}
 
   private:
@@ -265,31 +260,9 @@ auto Tissue<Springs, Kinds...>::force_on(Index v, const ConstPointsRef<Scalar>& 
 }
 
 template <class Springs, class... Kinds>
-auto Tissue<Springs, Kinds...>::majoriser(Index v, const ConstPointsRef<Scalar>& x) const noexcept
-    -> EnergyMajoriser<Scalar> {
-    CornerForce<Scalar> elements{{}, {}, {}};
-    for_each_corner_force(v, x, [&](const CornerForce<Scalar>& corner) { elements += corner; });
-    auto sum = springs_.majoriser(v, x);
-    add(sum, elements);
-    return sum;
-}
-
-template <class Springs, class... Kinds>
 auto Tissue<Springs, Kinds...>::hessian(Index v, const ConstPointsRef<Scalar>& x) const noexcept -> Symmetric3<Scalar> {
     auto sum = springs_.hessian(v, x);
     for_each_corner_force(v, x, [&](const CornerForce<Scalar>& corner) { sum += corner.hessian; });
-    return sum;
-}
-
-template <class Springs, class... Kinds>
-auto Tissue<Springs, Kinds...>::energy_change(Index v, const Vector3<Scalar>& displacement,
-                                              const ConstPointsRef<Scalar>& x) const noexcept -> EnergyChange<Scalar> {
-    auto sum = springs_.energy_change(v, displacement, x);
-    for_each_kind([&](const auto& elements) {
-        elements.for_each(v, x, [&](const auto& instance, const auto& corners, std::size_t i) {
-            sum += instance.element.energy_change(corners, i, displacement);
-        });
-    });
     return sum;
 }
 

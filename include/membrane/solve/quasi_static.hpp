@@ -23,7 +23,6 @@
 #include <membrane/solve/step.hpp>
 #include <membrane/solve/step_rule.hpp>
 #include <membrane/solve/step_state.hpp>
-#include <membrane/solve/sweeps.hpp>
 #include <membrane/solve/vertex_update.hpp>
 #include <membrane/surface/vertex_split.hpp>
 
@@ -41,7 +40,7 @@ template <class Network, class Scalar>
 concept NetworkOfSolver = !requires(Network & solver) {
     solver.wake_all();
 }
-&&CheckedElasticNetwork<Network, Scalar>;
+&&ElasticNetwork<Network, Scalar>;
 
 }  // namespace detail
 
@@ -74,7 +73,7 @@ class QuasiStaticSolver {
     /// Cost: `sweeps` + 1 evaluations of each active vertex; in layer 0, up to `sweeps` times `contact_iterations` + 1;
     /// one of each free vertex beside them, and one comparison of each pinned vertex. An evaluation costs the vertex's
     /// springs.
-    template <CheckedElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume,
+    template <ElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume,
               CheckedConstraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
                                           const Constraints&... constraints) noexcept {
@@ -85,7 +84,7 @@ class QuasiStaticSolver {
     /// contact iteration, 32 vertex updates, and the residual forces of all active vertices. One thread makes the
     /// updates. The next step continues where time ran out, so that a membrane reaches its equilibrium under any
     /// deadline.
-    template <class Now, CheckedElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume,
+    template <class Now, ElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume,
               CheckedConstraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step_until(const Deadline<Now>& deadline, PointsRef<Scalar> x, Scalar dt,
                                                 const Network& network, const Volume& volume,
@@ -151,6 +150,7 @@ class QuasiStaticSolver {
     template <class Network, class Volume>
     [[nodiscard]] StepReport<Scalar> step_in(TimeBudget budget, PointsRef<Scalar>& x, Scalar dt, const Network& network,
                                              const Volume& volume, Constraints constraints) noexcept;
+    // In the order of a step.
     template <class Network, class Volume>
     [[nodiscard]] StepStatus begin_constraints(const ConstraintList<Scalar>& acting, ConstraintContext<Scalar>& context,
                                                const Network& network, const Volume& volume) noexcept;
@@ -162,9 +162,31 @@ class QuasiStaticSolver {
     void seed_beside_moved_pins(const Network& network, ConstraintContext<Scalar>& context, bool with_body) noexcept;
     template <class Network>
     void select(const Network& network, const ConstraintContext<Scalar>& context) noexcept;
+    template <class Scene>
+    void load_and_pack(const Scene& scene) noexcept;
+    template <class Scene>
+    void load_packs(const Scene& scene, std::size_t first) noexcept;
+    template <class Scene>
+    void load_neighbours(const Scene& scene, Index v) noexcept;
+    template <class Scene>
+    void sweep(const Scene& scene, const ConstraintList<Scalar>& acting) noexcept;
+    template <class Scene>
+    bool iterate_contact(const Scene& scene, const ConstraintList<Scalar>& acting) noexcept;
+    bool enforce(const ConstraintList<Scalar>& acting) noexcept;
+    template <class Scene>
+    bool update_beyond(const Scene& scene) noexcept;
+    template <class Scene>
+    bool add_layer(const Scene& scene) noexcept;
+    template <class Scene>
+    bool update_until_time_is_up(const Scene& scene, std::size_t begin, std::size_t end) noexcept;
+    template <class Scene>
+    std::size_t pack_spare(const Scene& scene, std::size_t begin, std::size_t end) noexcept;
+    template <bool in_contact, class Scene>
+    bool update_packs(const Scene& scene, PackedVertices<Scalar>& packs, std::size_t p, std::size_t end) noexcept;
+    template <class Scene>
+    [[nodiscard]] bool evaluate_residuals(const Scene& scene) noexcept;
     template <class Network>
-    void write_back(PointsRef<Scalar>& x, const Network& network, Scalar queue_residual,
-                    bool constraints_changed) noexcept;
+    void write_back(PointsRef<Scalar>& x, const Network& network) noexcept;
     template <class Scene>
     void measure_beyond(const Scene& scene) noexcept;
     [[nodiscard]] bool has_moved(Index v) const noexcept {
@@ -173,6 +195,28 @@ class QuasiStaticSolver {
     }
     void keep_fixed_positions(const PointsRef<Scalar>& x) noexcept;
     [[nodiscard]] StepReport<Scalar> refuse_step(StepStatus status) noexcept;
+
+    [[nodiscard]] bool advances() const noexcept { return report_.status == StepStatus::advanced; }
+    // Number of loaded vertices that this step does not update.
+    [[nodiscard]] std::size_t beyond() const noexcept {
+        return state_.loaded.items().size() - active_.vertices().size();
+    }
+    void find_forces_beyond() noexcept;
+    [[nodiscard]] bool goes_on(std::size_t i) noexcept;
+
+    // How far the step has got.
+    struct Progress {
+        TimeBudget budget;
+        std::size_t resume;                // number beyond layer 0 of the vertex at which time ran out, in the last
+                                           // step or in this one
+        std::size_t in_packs = 0;          // number of active vertices in packs
+        std::size_t forces_seen = 0;       // number of vertices with a force of a constraint so far
+        bool forced_beyond = false;        // a constraint adds a force beyond layer 0
+        bool constraints_hold = false;     // the last enforcement found no violation, and nothing has moved since
+        bool constraints_changed = false;  // by the final enforcement, or there was no time for it
+        bool stopped = false;              // time ran out beyond layer 0
+        Scalar queue_residual = 0;         // largest residual force in the queue [N]
+    };
 
     [[no_unique_address]] Rule rule_;
     SolverOptions<Scalar> options_;
@@ -191,6 +235,7 @@ class QuasiStaticSolver {
     Predictor<Scalar, StepState<Scalar>::max_constraints> predictor_;
     std::array<Vector3<Scalar>, StepState<Scalar>::max_constraints> reactions_{};
     StepReport<Scalar> report_;
+    Progress progress_;
     bool complete_ = false;           // the last step made all its vertex updates
     RigidFrame<Scalar> pose_;         // of the body at the last step
     std::uint64_t deformations_ = 0;  // of the body at the last step
@@ -198,9 +243,8 @@ class QuasiStaticSolver {
     StepCosts costs_;
 };
 
-template <
-    class Network, class Rule = BlockStep,
-    bool = CheckedElasticNetwork<Network, typename Network::Scalar>&& CheckedStepRule<Rule, typename Network::Scalar>>
+template <class Network, class Rule = BlockStep,
+          bool = ElasticNetwork<Network, typename Network::Scalar>&& CheckedStepRule<Rule, typename Network::Scalar>>
 QuasiStaticSolver(const Network&, const SolverOptions<typename Network::Scalar>& = {}, const Rule& = {},
                   AnyExecutor = {}) -> QuasiStaticSolver<typename Network::Scalar, Rule>;
 
@@ -288,23 +332,22 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     set_supports(scene, options_.rigid_stiffness, state_.seeds.items());
     seed_beside_moved_pins(network, context, body_moved);
     select(network, context);
-    Sweeps<Scalar, Rule, Network, Volume> sweeps{scene,  rule_,  options_, executor_, active_, packed_,
-                                                 spare_, acting, report_,  budget,    resume_};
-    sweeps.load_and_pack();
-    sweeps.run();
-    if (report_.status == StepStatus::advanced && !sweeps.evaluate_residuals()) {
+    progress_ = {.budget = budget, .resume = resume_};
+    load_and_pack(scene);
+    sweep(scene, acting);
+    if (advances() && !evaluate_residuals(scene)) {
         state_.reset_points();  // a force of the last step may have diverged
         state_.restore(start);  // not bounded at the start positions either: the input is invalid
-        report_.status = sweeps.evaluate_residuals() ? StepStatus::unstable : StepStatus::invalid_input;
+        report_.status = evaluate_residuals(scene) ? StepStatus::unstable : StepStatus::invalid_input;
     }
-    if (report_.status == StepStatus::advanced && !acting.react(reactions_)) report_.status = StepStatus::unstable;
-    if (report_.status != StepStatus::advanced) return refuse_step(report_.status);
+    if (advances() && !acting.react(reactions_)) report_.status = StepStatus::unstable;
+    if (!advances()) return refuse_step(report_.status);
     acting.find_violation(report_);
     acting.end();
-    resume_ = sweeps.resume;
-    write_back(x, network, options_.adaptive_layers ? Scalar(0) : sweeps.queue_residual, sweeps.constraints_changed);
+    resume_ = progress_.resume;
+    write_back(x, network);
     measure_beyond(scene);
-    sweeps.budget.end();
+    progress_.budget.end();
     return report_;
 }
 
@@ -415,11 +458,263 @@ void QuasiStaticSolver<Scalar, Rule>::select(const Network& network,
     active_.begin_step(network, state_.seeds.items(), options_);
 }
 
+// Loads the positions of the active vertices and their neighbours. The first vertices, up to the capacity, are packed
+// once in a step, the others for each update.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+template <class Scene>
+void QuasiStaticSolver<Scalar, Rule>::load_and_pack(const Scene& scene) noexcept {
+    const auto from_queue = active_.vertices().first(active_.from_queue());
+    if (active_.take_new_queue() || packed_.assigned() != from_queue.size()) {
+        packed_.assign(from_queue, active_.queue().colour_ends(), scene.network);
+    }
+    packed_.append(active_.vertices(), from_queue.size(), active_.colour_ends(), scene.network);
+    load_packs(scene, 0);
+    for (const auto vertices :
+         {active_.vertices().subspan(progress_.in_packs), active_.frontier(), state_.prescribed.items()}) {
+        for (const Index v : vertices) load_neighbours(scene, v);
+    }
+    find_forces_beyond();
+    progress_.budget.begin(active_.vertices().size() + active_.frontier().size(), beyond());
+}
+
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+template <class Scene>
+void QuasiStaticSolver<Scalar, Rule>::load_packs(const Scene& scene, std::size_t first) noexcept {
+    for (const Index v : packed_.needed()) state_.load(v, scene.start, scene.network);
+    packed_.begin_step(scene, first);
+    progress_.in_packs = packed_.size();
+}
+
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+template <class Scene>
+void QuasiStaticSolver<Scalar, Rule>::load_neighbours(const Scene& scene, Index v) noexcept {
+    state_.load(v, scene.start, scene.network);
+    for (const auto& end : scene.network.neighbours(v)) state_.load(end.other, scene.start, scene.network);
+}
+
+// Whether a constraint adds a force beyond layer 0: only then the forces there are read.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+void QuasiStaticSolver<Scalar, Rule>::find_forces_beyond() noexcept {
+    const auto forced = state_.forced.items();
+    const auto unseen = forced.subspan(std::exchange(progress_.forces_seen, forced.size()));
+    progress_.forced_beyond |=
+        std::any_of(unseen.begin(), unseen.end(), [&](Index v) { return !state_.seeds.contains(v); });
+}
+
+// Sweeps until no vertex moves, `sweeps` are done, or time is up. A sweep is contact iterations, each of which updates
+// layer 0 and then enforces the constraints, and an update of each vertex beyond.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+template <class Scene>
+void QuasiStaticSolver<Scalar, Rule>::sweep(const Scene& scene, const ConstraintList<Scalar>& acting) noexcept {
+    bool changed = true;
+    for (Index i = 0; i < options_.sweeps && changed && !report_.out_of_time; ++i) {
+        changed = iterate_contact(scene, acting);
+        if (!advances()) return;
+        const bool moved = update_beyond(scene);
+        if (!advances()) return;
+        if (moved) progress_.constraints_hold = false;
+        changed |= moved;
+        // The queue needs no more. If vertices outside have waited for it, they are next.
+        if (!changed && state_.outside_tolerance() > state_.force_tolerance) {
+            state_.queue_residual = 0;
+            changed = true;
+        }
+    }
+    if ((changed || report_.out_of_time) && !progress_.constraints_hold) {
+        if (!progress_.budget.has_time_to_enforce()) report_.out_of_time = true;
+        progress_.constraints_changed = report_.out_of_time || enforce(acting);
+    }
+}
+
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+template <class Scene>
+bool QuasiStaticSolver<Scalar, Rule>::iterate_contact(const Scene& scene,
+                                                      const ConstraintList<Scalar>& acting) noexcept {
+    const auto layer = active_.contact_layer();
+    bool changed = false;
+    for (Index i = 0; i < options_.contact_iterations; ++i) {
+        if (!progress_.budget.has_time_for_contact(layer.size())) {
+            report_.out_of_time = true;
+            break;
+        }
+        const std::size_t packed_count = (std::min)(layer.size(), progress_.in_packs);
+        changed |= update_packs<true>(scene, packed_, 0, packed_.pack_from(packed_count));
+        for (std::size_t begin = packed_count, end; begin < layer.size(); begin = end) {
+            end = pack_spare(scene, begin, layer.size());
+            changed |= update_packs<true>(scene, spare_, 0, spare_.count());
+        }
+        progress_.budget.updated(layer.size());
+        if (!advances()) break;
+        if (!enforce(acting)) break;
+        changed = true;
+    }
+    return changed;
+}
+
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+bool QuasiStaticSolver<Scalar, Rule>::enforce(const ConstraintList<Scalar>& acting) noexcept {
+    progress_.constraints_hold = !acting.enforce();
+    progress_.budget.enforced();
+    find_forces_beyond();
+    return !progress_.constraints_hold;
+}
+
+// Updates in a cycle from the vertex at which time ran out.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+template <class Scene>
+bool QuasiStaticSolver<Scalar, Rule>::update_beyond(const Scene& scene) noexcept {
+    const std::size_t first = active_.contact_layer().size(), end = active_.vertices().size();
+    const std::size_t begin = first + (std::min)(std::exchange(progress_.resume, 0), end - first);
+    bool changed = update_until_time_is_up(scene, begin, end);
+    changed |= update_until_time_is_up(scene, first, begin);
+    while (add_layer(scene)) changed = true;
+    return changed;
+}
+
+// With `adaptive_layers`: adds the next layer, and updates it, if a force on it is above the tolerance.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+template <class Scene>
+bool QuasiStaticSolver<Scalar, Rule>::add_layer(const Scene& scene) noexcept {
+    const auto frontier = active_.frontier();
+    if (frontier.empty() || progress_.stopped || !advances()) return false;
+    if (!progress_.budget.has_time_for_batch()) {
+        report_.out_of_time = true;
+        return false;
+    }
+    report_.vertex_updates += static_cast<Index>(frontier.size());
+    const bool needed = std::any_of(frontier.begin(), frontier.end(), [&](Index v) {
+        return !state_.is_fixed(v) && norm(total_force(scene, v).force) > state_.force_tolerance;
+    });
+    progress_.budget.updated(frontier.size());
+    if (!needed) return false;
+    const std::size_t before = active_.vertices().size();
+    active_.grow(scene.network, options_);
+    const std::size_t first = packed_.count();
+    packed_.extend(active_.vertices(), before, active_.colour_ends(), scene.network);
+    load_packs(scene, first);
+    for (const Index v : active_.vertices().subspan(progress_.in_packs)) load_neighbours(scene, v);
+    for (const Index v : active_.frontier()) load_neighbours(scene, v);
+    progress_.budget.set_residual_count(active_.vertices().size() + active_.frontier().size(), beyond());
+    update_until_time_is_up(scene, before, active_.vertices().size());
+    return true;
+}
+
+// Updates the active vertices number `begin` to `end`.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+template <class Scene>
+bool QuasiStaticSolver<Scalar, Rule>::update_until_time_is_up(const Scene& scene, std::size_t begin,
+                                                              std::size_t end) noexcept {
+    const std::size_t packed_end = std::clamp(progress_.in_packs, begin, end), last = packed_.pack_from(packed_end);
+    bool changed = false;
+    const auto update = [&](PackedVertices<Scalar>& packs, std::size_t p, std::size_t next) {
+        const Index before = report_.vertex_updates;
+        changed |= update_packs<false>(scene, packs, p, next);
+        progress_.budget.updated(static_cast<std::size_t>(report_.vertex_updates - before));
+    };
+    for (std::size_t p = packed_.pack_from(begin), next; p < last && goes_on(packed_.first_of(p)); p = next) {
+        next = progress_.budget.limited() ? (std::min)(p + updates_in_batch / Lanes<Scalar>::count, last) : last;
+        update(packed_, p, next);
+    }
+    for (std::size_t i = packed_end, next; i < end && goes_on(i); i = next) {
+        next = pack_spare(scene, i, end);
+        update(spare_, 0, spare_.count());
+    }
+    return changed;
+}
+
+// Packs a batch of one group of the active vertices number `begin` to `end`. Returns its end.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+template <class Scene>
+std::size_t QuasiStaticSolver<Scalar, Rule>::pack_spare(const Scene& scene, std::size_t begin,
+                                                        std::size_t end) noexcept {
+    const bool of_queue = begin < active_.from_queue();
+    const auto ends = of_queue ? active_.queue().colour_ends() : active_.colour_ends();
+    const std::size_t group_end = *std::upper_bound(ends.begin(), ends.end(), begin);
+    end = (std::min)({end, group_end, begin + updates_in_batch, of_queue ? active_.from_queue() : end});
+    const auto vertices = active_.vertices().subspan(begin, end - begin);
+    const std::array<std::size_t, 1> one_group{vertices.size()};
+    spare_.assign(of_queue ? vertices : std::span<const Index>(), one_group, scene.network);
+    if (!of_queue) spare_.append(vertices, 0, one_group, scene.network);
+    spare_.begin_step(scene);
+    return end;
+}
+
+// Whether there is time for a batch that begins with active vertex number `i`.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+bool QuasiStaticSolver<Scalar, Rule>::goes_on(std::size_t i) noexcept {
+    if (progress_.stopped || !advances()) return false;
+    if (progress_.budget.has_time_for_batch()) return true;
+    report_.out_of_time = progress_.stopped = true;
+    progress_.resume = i - active_.contact_layer().size();
+    return false;
+}
+
+// No spring joins the packs of a group: threads may share them. Under a deadline batches are too small to distribute.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+template <bool in_contact, class Scene>
+bool QuasiStaticSolver<Scalar, Rule>::update_packs(const Scene& scene, PackedVertices<Scalar>& packs, std::size_t p,
+                                                   std::size_t end) noexcept {
+    bool changed = false;
+    const AnyExecutor calling_thread;
+    const AnyExecutor& distributor = progress_.budget.limited() ? calling_thread : executor_;
+    while (p < end && advances()) {
+        const std::size_t group_end = packs.end_of_group(p, end);
+        packs.template update<in_contact>(p, group_end, scene, rule_, progress_.forced_beyond, distributor);
+        for (; p < group_end && advances(); ++p) {
+            using Outcome = typename PackedVertices<Scalar>::Outcome;
+            report_.vertex_updates += packs.free_count(p);
+            if (packs.outcome(p) == Outcome::unstable) report_.status = StepStatus::unstable;
+            changed |= packs.outcome(p) == Outcome::moved;
+        }
+    }
+    return changed;
+}
+
+// Evaluates the residual forces on all active vertices. Returns whether the next step can go on from there: the squares
+// of positions and forces do not overflow, nor those of the forces without constraints, which may be gone then. As forces
+// may increase once they are gone, a step with constraints has a margin.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+template <class Scene>
+bool QuasiStaticSolver<Scalar, Rule>::evaluate_residuals(const Scene& scene) noexcept {
+    const bool constrained = !state_.forced.items().empty() || !state_.prescribed.items().empty();
+    const Scalar largest = detail::too_large<Scalar> / (constrained ? 100 : 1);
+    Scalar squares = 0;
+    const auto count = [&](Index v) {
+        const Vector3<Scalar> force = state_.residual_force(v);
+        ++report_.vertex_updates;
+        if (!state_.is_fixed(v)) {
+            report_.residual = (std::max)(report_.residual, norm(force));
+            if (active_.queue().contains(v))
+                progress_.queue_residual = (std::max)(progress_.queue_residual, norm(force));
+        }
+        squares += squared_norm(force) + squared_norm<Scalar>(force - state_.constraint_force(v)) +
+                   squared_norm(state_.position_of(v));
+    };
+    const auto evaluate = [&](Index v) {
+        const Vector3<Scalar> force = total_force(scene, v).force;
+        state_.set_residual(v, force, norm(undamped_force(scene, v, force)));
+        count(v);
+    };
+    const auto& prescribed = state_.prescribed;
+    for (std::size_t p = 0; p < packed_.count(); ++p) {
+        packed_.evaluate_residual(p, scene);
+        for (const Index v : packed_.vertices(p)) {
+            if (!prescribed.contains(v)) count(v);
+        }
+    }
+    for (const auto vertices : {active_.vertices().subspan(progress_.in_packs), active_.frontier()}) {
+        for (const Index v : vertices) {
+            if (!prescribed.contains(v)) evaluate(v);
+        }
+    }
+    for (const Index v : prescribed.items()) evaluate(v);
+    return is_finite(squares) && squares < largest * largest;
+}
+
 // Writes the positions of moved vertices, and wakes their neighbours.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Network>
-void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Network& network, Scalar queue_residual,
-                                                 bool constraints_changed) noexcept {
+void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Network& network) noexcept {
     moved_.clear();
     for (const Index v : state_.loaded.items()) {
         const Vector3<Scalar> now = state_.position_of(v), before = point(x, v);
@@ -435,7 +730,7 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
     }
     placed_.clear();
     report_.moved = moved_.items();
-    state_.queue_residual = queue_residual;
+    state_.queue_residual = options_.adaptive_layers ? Scalar(0) : progress_.queue_residual;
     const Scalar tolerance = state_.force_tolerance, outside = state_.outside_tolerance();
     const auto is_balanced = [&](Index v) {
         const bool fixed = state_.loaded.contains(v) ? state_.is_fixed(v) : network.pinned(v);
@@ -445,8 +740,9 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
     // Now and then, as this costs all that has moved since the last equilibrium.
     const bool recheck = outside < state_.asleep_below && (outside == tolerance || outside < state_.asleep_below / 4);
     state_.asleep_below = recheck ? outside : (std::max)(state_.asleep_below, outside);
-    report_.converged = active_.end_step(network, is_balanced, report_.moved, recheck) && !constraints_changed &&
-                        report_.residual <= tolerance && state_.asleep_below <= tolerance;
+    report_.converged = active_.end_step(network, is_balanced, report_.moved, recheck) &&
+                        !progress_.constraints_changed && report_.residual <= tolerance &&
+                        state_.asleep_below <= tolerance;
     if (options_.relative_tolerance > 0 && !report_.out_of_time && !active_.truncated()) {
         Scalar felt = 0;
         for (const auto& reaction : report_.reactions) felt += norm(reaction);

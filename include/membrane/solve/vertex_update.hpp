@@ -8,7 +8,6 @@
 
 #include <membrane/model/mass_spring_network.hpp>
 #include <membrane/model/volume_springs.hpp>
-#include <membrane/solve/largest_eigenvalue.hpp>
 #include <membrane/solve/step_rule.hpp>
 #include <membrane/solve/step_state.hpp>
 
@@ -115,8 +114,8 @@ template <class Scalar, class Network, class Volume>
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] bool diverges(const StepInput<Scalar, Network, Volume>& scene, Index v, Scalar compliance) noexcept {
     const Scalar others = non_network_force(scene, v).stiffness;
-    if (compliance * (stiffness_bound_of(scene.network.majoriser(v, scene.x)) + others) < 2) return false;
-    return compliance * (largest_eigenvalue_at<Scalar>(scene.network, v, scene.x) + others) >= 2;
+    if (compliance * (scene.network.force_on(v, scene.x).stiffness + others) < 2) return false;
+    return compliance * (largest_eigenvalue(scene.network.hessian(v, scene.x)) + others) >= 2;
 }
 
 /// Whether an update needs a line search: springs or elements may stiffen, and `Rule` guarantees descent.
