@@ -2,16 +2,16 @@
 #include <string>
 #include <vector>
 
-#include <membrane/model/bending.hpp>
-#include <membrane/model/bending_triangles.hpp>
-#include <membrane/model/fibres.hpp>
 #include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/fung.hpp>
-#include <membrane/model/neo_hookean.hpp>
-#include <membrane/model/pressure.hpp>
 #include <membrane/model/spring_stiffness.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
+#include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/bending_triangles.hpp>
+#include <membrane/tissue/fibres.hpp>
+#include <membrane/tissue/fung.hpp>
+#include <membrane/tissue/neo_hookean.hpp>
+#include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/scene.hpp"
 #include "support/slide.hpp"

@@ -13,10 +13,10 @@
 #include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/spring_stiffness.hpp>
 // [tissue]
-#include <membrane/model/bending.hpp>
-#include <membrane/model/pressure.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
+#include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 // [/tissue]
 
 #include "support/figure.hpp"

@@ -14,15 +14,15 @@
 #include <membrane/accuracy/equilibrium.hpp>
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/contact/facet_correction.hpp>
-#include <membrane/model/bending.hpp>
-#include <membrane/model/bending_triangles.hpp>
 #include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/pressure.hpp>
 #include <membrane/model/spring_stiffness.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/bending_triangles.hpp>
+#include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 /// The library's membrane in a scene: triangular springs, bending if it is asked for, pressure, foundation, tools.
 ///

@@ -12,10 +12,10 @@
 
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/model/tearable_springs.hpp>
-#include <membrane/model/tissue.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
 #include <membrane/tear/tearing.hpp>
+#include <membrane/tissue/tissue.hpp>
 
 #include "support/tear_shear.hpp"
 

@@ -9,10 +9,10 @@
 
 #include <Eigen/Geometry>
 
-#include <membrane/model/bending.hpp>
 #include <membrane/model/moving_foundation.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
+#include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "slide.hpp"
 #include "suction.hpp"

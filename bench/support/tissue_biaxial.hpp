@@ -8,11 +8,11 @@
 #include <vector>
 
 #include <membrane/calibration/fit.hpp>
-#include <membrane/model/fibres.hpp>
-#include <membrane/model/fung.hpp>
-#include <membrane/model/neo_hookean.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
+#include <membrane/tissue/fibres.hpp>
+#include <membrane/tissue/fung.hpp>
+#include <membrane/tissue/neo_hookean.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "sheet.hpp"
 

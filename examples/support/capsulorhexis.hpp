@@ -7,11 +7,11 @@
 
 #include <membrane/membrane.hpp>
 #include <membrane/meshing/distmesh.hpp>
-#include <membrane/model/bending.hpp>
 #include <membrane/model/material.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/tear/tearing.hpp>
+#include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/fluid.hpp"
 #include "support/loop_options.hpp"

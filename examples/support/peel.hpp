@@ -8,7 +8,7 @@
 #include <vector>
 
 #include <membrane/model/material.hpp>
-#include <membrane/model/triangular_springs.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/peel_scene.hpp"
 #include "support/plot.hpp"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include <membrane/model/triangular_springs.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/capsulorhexis.hpp"
 #include "support/opening.hpp"

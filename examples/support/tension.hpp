@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string>
 
-#include <membrane/model/elements.hpp>
+#include <membrane/tissue/elements.hpp>
 
 #include "support/figure.hpp"
 #include "support/surface_state.hpp"

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <utility>
 
-#include <membrane/model/triangular_springs.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "hand.hpp"
 #include "session.hpp"

@@ -16,10 +16,10 @@
 #include <membrane/meshing/distmesh.hpp>
 #include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/material.hpp>
-#include <membrane/model/pressure.hpp>
 #include <membrane/model/spring_stiffness.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
+#include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

@@ -4,13 +4,13 @@
 #include <numbers>
 
 #include <membrane/accuracy/equilibrium.hpp>
-#include <membrane/model/pressure.hpp>
 #include <membrane/model/spring_stiffness.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/catch.hpp"
 #include "support/meshes.hpp"

@@ -17,8 +17,8 @@
 
 #include <membrane/membrane.hpp>
 #include <membrane/model/tearable_springs.hpp>
-#include <membrane/model/tissue.hpp>
 #include <membrane/tear/tearing.hpp>
+#include <membrane/tissue/tissue.hpp>
 
 namespace {
 

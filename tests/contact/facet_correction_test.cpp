@@ -13,10 +13,10 @@
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/meshing/distmesh.hpp>
 #include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

@@ -91,8 +91,8 @@
 // [/friction]
 
 // [tear]
-#include <membrane/model/tissue.hpp>
 #include <membrane/tear/tearing.hpp>
+#include <membrane/tissue/tissue.hpp>
 // [/tear]
 
 // [equilibrium]
@@ -116,8 +116,8 @@
 #include <membrane/calibration/indentation.hpp>
 // [/fit]
 
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/catch.hpp"
 

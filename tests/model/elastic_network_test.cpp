@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/model/elastic_network.hpp>
 
-#include <membrane/model/bending.hpp>
-#include <membrane/model/pressure.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
+#include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/catch.hpp"
 #include "support/spring_law_check.hpp"

@@ -9,17 +9,17 @@
 #include <type_traits>
 #include <vector>
 
-#include <membrane/model/bending.hpp>
 #include <membrane/model/cohesive_springs.hpp>
 #include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/fung.hpp>
-#include <membrane/model/neo_hookean.hpp>
 #include <membrane/model/spring_stiffness.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/fung.hpp>
+#include <membrane/tissue/neo_hookean.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

@@ -33,16 +33,16 @@
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/haptics/virtual_coupling.hpp>
 #include <membrane/membrane.hpp>
-#include <membrane/model/bending.hpp>
 #include <membrane/model/cohesive_springs.hpp>
 #include <membrane/model/moving_foundation.hpp>
-#include <membrane/model/pressure.hpp>
 #include <membrane/model/tearable_springs.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/solve/tool_friction.hpp>
 #include <membrane/surface/moving_body.hpp>
 #include <membrane/tear/tearing.hpp>
+#include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 namespace {
 

@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/model/bending.hpp>
-#include <membrane/model/pressure.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
+#include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

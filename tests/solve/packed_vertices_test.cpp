@@ -12,16 +12,16 @@
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/core/thread_pool.hpp>
-#include <membrane/model/bending.hpp>
 #include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/moving_foundation.hpp>
-#include <membrane/model/pressure.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/solve/constraints.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"

@@ -8,10 +8,10 @@
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/model/material.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

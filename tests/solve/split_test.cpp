@@ -13,14 +13,14 @@
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/contact/grasper.hpp>
 #include <membrane/core/snapshot.hpp>
-#include <membrane/model/bending.hpp>
-#include <membrane/model/neo_hookean.hpp>
 #include <membrane/model/tearable_springs.hpp>
-#include <membrane/model/tissue.hpp>
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
 #include <membrane/tear/tearing.hpp>
+#include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/neo_hookean.hpp>
+#include <membrane/tissue/tissue.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"

@@ -67,10 +67,10 @@ struct FindCosts {
 
     template <class... Part>
     void operator()(const Part&... part) const {
-        const auto look_at = [this](const auto& one) {
+        const auto keep_costs = [this](const auto& one) {
             if constexpr (std::is_same_v<std::remove_cvref_t<decltype(one)>, StepCosts>) *found = one;
         };
-        (look_at(part), ...);
+        (keep_costs(part), ...);
     }
 };
 

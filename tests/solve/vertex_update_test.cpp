@@ -5,13 +5,13 @@
 #include <cmath>
 #include <cstdint>
 
-#include <membrane/model/bending.hpp>
-#include <membrane/model/pressure.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/solve/packed_vertices.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

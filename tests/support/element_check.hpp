@@ -9,7 +9,7 @@
 #include <Eigen/Core>
 
 #include <membrane/core/lanes.hpp>
-#include <membrane/model/elements.hpp>
+#include <membrane/tissue/elements.hpp>
 
 #include "support/catch.hpp"
 #include "support/eigenvalues.hpp"

@@ -13,12 +13,12 @@
 #include <Eigen/LU>
 
 #include <membrane/accuracy/equilibrium.hpp>
-#include <membrane/model/incompressible_triangle.hpp>
-#include <membrane/model/pressure.hpp>
-#include <membrane/model/tissue.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/incompressible_triangle.hpp>
+#include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/tissue.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

@@ -13,10 +13,10 @@
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/membrane.hpp>
 #include <membrane/model/cohesive_springs.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/solve/tool_friction.hpp>
 #include <membrane/tear/tearing.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/bits.hpp"
 #include "support/random.hpp"

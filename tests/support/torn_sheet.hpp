@@ -14,10 +14,10 @@
 #include <membrane/model/material.hpp>
 #include <membrane/model/spring_stiffness.hpp>
 #include <membrane/model/tearable_springs.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/tear/tearing.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/fluid.hpp"
 #include "support/hand_work.hpp"

@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <type_traits>
 
-#include <membrane/model/elements.hpp>
 #include <membrane/model/mass_spring_network.hpp>
+#include <membrane/tissue/elements.hpp>
 
 /// The energy of a network as one vertex moves, from its springs and elements.
 ///

@@ -14,9 +14,9 @@
 #include <membrane/solve/tool_friction.hpp>
 #include <membrane/surface/normals.hpp>
 
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/orders.hpp"
 #include "support/random_tear.hpp"

@@ -12,11 +12,11 @@
 #include <vector>
 
 #include <membrane/accuracy/equilibrium.hpp>
-#include <membrane/model/bending.hpp>
 #include <membrane/model/tearable_springs.hpp>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/tear/tearing.hpp>
+#include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/tear/crack_driving_force.hpp>
 
-#include <membrane/model/fung.hpp>
-#include <membrane/model/neo_hookean.hpp>
-#include <membrane/model/triangular_springs.hpp>
+#include <membrane/tissue/fung.hpp>
+#include <membrane/tissue/neo_hookean.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

@@ -12,8 +12,8 @@
 #include <membrane/core/initial_state.hpp>
 #include <membrane/core/snapshot.hpp>
 #include <membrane/mesh_check/validate.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"

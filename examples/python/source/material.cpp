@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/bending.hpp>
 #include <membrane/model/material.hpp>
 #include <membrane/model/recommended_layers.hpp>
 #include <membrane/model/spring_stiffness.hpp>
+#include <membrane/tissue/bending.hpp>
 
 #include "types.hpp"
 

@@ -16,9 +16,9 @@
 #include <membrane/model/cohesive_springs.hpp>
 #include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/tearable_springs.hpp>
-#include <membrane/model/tissue.hpp>
 #include <membrane/solve/tool_friction.hpp>
 #include <membrane/tear/tearing.hpp>
+#include <membrane/tissue/tissue.hpp>
 
 #include "arrays.hpp"
 #include "documentation.hpp"

@@ -21,9 +21,9 @@
 #include <membrane/model/cohesive_springs.hpp>
 #include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/spring_stiffness.hpp>
-#include <membrane/model/tissue.hpp>
 #include <membrane/solve/tool_friction.hpp>
 #include <membrane/tear/tearing.hpp>
+#include <membrane/tissue/tissue.hpp>
 
 namespace {
 

@@ -15,9 +15,10 @@
 #include <membrane/core/field.hpp>
 #include <membrane/core/fixed_vector.hpp>
 #include <membrane/model/elastic_network.hpp>
-#include <membrane/model/elements.hpp>
+#include <membrane/model/element.hpp>
 #include <membrane/model/spring_law.hpp>
 #include <membrane/surface/adjacency.hpp>
+#include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
 /// The membrane as masses joined by springs, one along each edge of the mesh.
@@ -135,14 +136,14 @@ MEMBRANE_INLINE void add(VertexForce<Scalar>& sum, const SpringForce<Scalar>& sp
     sum.stiffness += larger(spring.along, spring.across);
 }
 
-/// The springs' sum for an `EnergyMajoriser`, in few operations: the stiffness reduction as a sum of dyads, the size as a
-/// quotient. A spring of stiffness k, tension T and length l stores at the length l' the energy k (l' - r)^2 / 2 and a
-/// constant, r = l - T / k (or less, if it never stiffens). Of k (l'^2 - 2 r l' + r^2) / 2 only the second term is not
-/// quadratic in the position. Let u be the direction away from the other end. A displacement of the vertex by a along u
-/// and b across, of length at most rho, makes l' = sqrt((l + a)^2 + b^2) >= l + a + b^2 / (2 (l + rho)). So the energy
-/// stays below a quadratic of stiffness k along the spring and k (1 - r / (l + rho)) across it. `stiffness_reduction` is
-/// the sum of k min(r / l, 1) (I - u u^T), `size` the smallest max(l, r): with these, stiffness_reduction / (1 + rho /
-/// size) is at most the sum of k r / (l + rho) (I - u u^T).
+/// The springs' sum for an `EnergyMajoriser`, in few operations: the stiffness reduction as a sum of dyads, the size as
+/// a quotient. A spring of stiffness k, tension T and length l stores at the length l' the energy k (l' - r)^2 / 2 and
+/// a constant, r = l - T / k (or less, if it never stiffens). Of k (l'^2 - 2 r l' + r^2) / 2 only the second term is
+/// not quadratic in the position. Let u be the direction away from the other end. A displacement of the vertex by a
+/// along u and b across, of length at most rho, makes l' = sqrt((l + a)^2 + b^2) >= l + a + b^2 / (2 (l + rho)). So the
+/// energy stays below a quadratic of stiffness k along the spring and k (1 - r / (l + rho)) across it.
+/// `stiffness_reduction` is the sum of k min(r / l, 1) (I - u u^T), `size` the smallest max(l, r): with these,
+/// stiffness_reduction / (1 + rho / size) is at most the sum of k r / (l + rho) (I - u u^T).
 template <Number Scalar>
 struct CurvedSum {
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]

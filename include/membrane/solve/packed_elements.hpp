@@ -11,7 +11,7 @@
 
 #include <membrane/core/fixed_vector.hpp>
 #include <membrane/core/lane_points.hpp>
-#include <membrane/model/elements.hpp>
+#include <membrane/tissue/elements.hpp>
 
 /// Elements of vertices that are updated in SIMD lanes.
 ///

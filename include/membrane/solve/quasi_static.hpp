@@ -671,8 +671,8 @@ bool QuasiStaticSolver<Scalar, Rule>::update_packs(const Scene& scene, PackedVer
 }
 
 // Evaluates the residual forces on all active vertices. Returns whether the next step can go on from there: the squares
-// of positions and forces do not overflow, nor those of the forces without constraints, which may be gone then. As forces
-// may increase once they are gone, a step with constraints has a margin.
+// of positions and forces do not overflow, nor those of the forces without constraints, which may be gone then. As
+// forces may increase once they are gone, a step with constraints has a margin.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Scene>
 bool QuasiStaticSolver<Scalar, Rule>::evaluate_residuals(const Scene& scene) noexcept {

@@ -5,9 +5,9 @@
 #include <cstddef>
 #include <span>
 
-#include <membrane/model/tissue.hpp>
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_adjacency.hpp>
+#include <membrane/tissue/tissue.hpp>
 
 /// The energy that a membrane releases as a tear advances.
 namespace membrane {

@@ -8,7 +8,7 @@
 // noexcept must wrong: Element: energy_change(const Corners<float, corner_count>&, std::size_t, const Vector3<float>&)
 // const noexcept must wrong: Element: hessian_block(const Corners<double, corner_count>&, std::size_t, std::size_t)
 // const must return
-#include <membrane/model/elements.hpp>
+#include <membrane/tissue/elements.hpp>
 
 template <class Scalar>
 using Corners = membrane::Corners<Scalar, 3>;

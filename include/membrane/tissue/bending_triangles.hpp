@@ -12,9 +12,9 @@
 
 #include <Eigen/QR>
 
-#include <membrane/model/elements.hpp>
 #include <membrane/surface/half_edges.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/tissue/elements.hpp>
 
 /// Bending of a plate or shell, with its Poisson ratio, on any mesh.
 ///

@@ -12,9 +12,9 @@
 
 #include <membrane/core/check.hpp>
 #include <membrane/core/lanes.hpp>
-#include <membrane/model/incompressible_triangle.hpp>
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/tissue/incompressible_triangle.hpp>
 
 /// Families of fibres in a sheet: collagen.
 ///

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/bending_triangles.hpp>
+#include <membrane/tissue/bending_triangles.hpp>
 
 #include <algorithm>
 #include <array>

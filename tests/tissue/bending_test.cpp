@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/bending.hpp>
+#include <membrane/tissue/bending.hpp>
 
 #include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
-#include <membrane/model/tissue.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/tissue.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/fibres.hpp>
+#include <membrane/tissue/fibres.hpp>
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include <numbers>
 #include <vector>
 
-#include <membrane/model/neo_hookean.hpp>
+#include <membrane/tissue/neo_hookean.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

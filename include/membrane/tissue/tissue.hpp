@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/model/elements.hpp>
 #include <membrane/model/mass_spring_network.hpp>
+#include <membrane/tissue/elements.hpp>
 
 /// A network of springs and other elements.
 ///

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/tissue.hpp>
+#include <membrane/tissue/tissue.hpp>
 
 #include <cmath>
 #include <limits>
 #include <set>
 
 #include <membrane/accuracy/equilibrium.hpp>
-#include <membrane/model/bending.hpp>
-#include <membrane/model/pressure.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/solve/explicit_euler.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"

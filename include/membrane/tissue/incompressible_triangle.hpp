@@ -10,8 +10,8 @@
 
 #include <Eigen/Core>
 
-#include <membrane/model/elements.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/tissue/elements.hpp>
 
 /// Large strain of a triangle of an incompressible sheet: what its elements have in common.
 ///

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/pressure.hpp>
+#include <membrane/tissue/pressure.hpp>
 
 #include <array>
 #include <cmath>
 #include <limits>
 
 #include <Eigen/Geometry>
-#include <membrane/model/tissue.hpp>
-#include <membrane/model/triangular_springs.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/tissue.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/triangular_springs.hpp>
+#include <membrane/tissue/triangular_springs.hpp>
 
 #include <algorithm>
 #include <array>
@@ -9,9 +9,9 @@
 #include <Eigen/LU>
 
 #include <membrane/meshing/distmesh.hpp>
-#include <membrane/model/tissue.hpp>
 #include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/tissue.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/model/elements.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/tissue/elements.hpp>
 
 /// Loads that keep a stretched membrane in its shape.
 ///

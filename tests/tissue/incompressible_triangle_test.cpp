@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/incompressible_triangle.hpp>
+#include <membrane/tissue/incompressible_triangle.hpp>
 
 #include <cmath>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/neo_hookean.hpp>
+#include <membrane/tissue/neo_hookean.hpp>
 
 #include <array>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/fung.hpp>
+#include <membrane/tissue/fung.hpp>
 
 #include <array>
 #include <cmath>
