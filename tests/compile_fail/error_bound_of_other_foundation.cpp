@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A bound for a foundation that may not be linear.
 // expect: LinearFoundation
-#include <membrane/accuracy/error_bound.hpp>
+#include <membrane/certify/error_bound.hpp>
 
 struct Tether {
     template <membrane::Real Scalar>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A bound for springs whose energy it knows nothing of.
 // expect: the springs must follow LinearSpring
-#include <membrane/accuracy/error_bound.hpp>
+#include <membrane/certify/error_bound.hpp>
 
 #ifdef CORRECT
 using Law = membrane::LinearSpring;

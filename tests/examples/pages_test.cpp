@@ -100,7 +100,7 @@
 // [/equilibrium]
 
 // [bound]
-#include <membrane/accuracy/error_bound.hpp>
+#include <membrane/certify/error_bound.hpp>
 // [/bound]
 
 // [mesh_error]

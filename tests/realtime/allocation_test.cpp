@@ -10,9 +10,9 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <membrane/accuracy/error_bound.hpp>
-#include <membrane/accuracy/factored_convexity.hpp>
 #include <membrane/accuracy/tangent_stiffness.hpp>
+#include <membrane/certify/error_bound.hpp>
+#include <membrane/certify/factored_convexity.hpp>
 #include <membrane/core/snapshot.hpp>
 #include <membrane/core/thread_pool.hpp>
 #include <membrane/haptics/recording.hpp>

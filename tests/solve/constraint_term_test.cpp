@@ -5,7 +5,7 @@
 #include <vector>
 
 #include <membrane/accuracy/equilibrium.hpp>
-#include <membrane/accuracy/error_bound.hpp>
+#include <membrane/certify/error_bound.hpp>
 #include <membrane/surface/shapes.hpp>
 
 #include "support/catch.hpp"

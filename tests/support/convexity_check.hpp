@@ -6,7 +6,7 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <membrane/accuracy/convexity.hpp>
+#include <membrane/certify/convexity.hpp>
 #include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <pybind11/stl.h>
-#include <membrane/accuracy/error_bound.hpp>
+#include <membrane/certify/error_bound.hpp>
 
 #include "types.hpp"
 

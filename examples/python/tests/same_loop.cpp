@@ -10,10 +10,10 @@
 #include <string_view>
 
 #include <membrane/accuracy/equilibrium.hpp>
-#include <membrane/accuracy/error_bound.hpp>
 #include <membrane/accuracy/trial.hpp>
 #include <membrane/calibration/fit.hpp>
 #include <membrane/calibration/indentation.hpp>
+#include <membrane/certify/error_bound.hpp>
 #include <membrane/haptics/force_limits.hpp>
 #include <membrane/haptics/simulated_hand.hpp>
 #include <membrane/membrane.hpp>

@@ -2,7 +2,7 @@
 // wrong: ConvexityModel: must be copyable
 // wrong: ConvexityModel: must have a constructor from const EquilibriumProblem&
 // wrong: ConvexityModel: eigenvalue_bound(const EquilibriumProblem&, double radius) noexcept must return double
-#include <membrane/accuracy/convexity.hpp>
+#include <membrane/certify/convexity.hpp>
 
 struct Guess {
 #if WRONG != 2

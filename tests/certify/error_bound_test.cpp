@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/accuracy/error_bound.hpp>
+#include <membrane/certify/error_bound.hpp>
 
 #include <algorithm>
 #include <array>
@@ -10,8 +10,8 @@
 #include <sstream>
 #include <vector>
 
-#include <membrane/accuracy/factored_convexity.hpp>
 #include <membrane/accuracy/tangent_stiffness.hpp>
+#include <membrane/certify/factored_convexity.hpp>
 #include <membrane/model/moving_foundation.hpp>
 #include <membrane/model/tearable_springs.hpp>
 #include <membrane/solve/quasi_static.hpp>

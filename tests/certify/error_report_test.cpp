@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/accuracy/error_report.hpp>
+#include <membrane/certify/error_report.hpp>
 
 #include <limits>
 

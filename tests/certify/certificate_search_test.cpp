@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/accuracy/error_bound.hpp>
+#include <membrane/certify/error_bound.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include <membrane/accuracy/factored_convexity.hpp>
+#include <membrane/certify/factored_convexity.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

@@ -9,11 +9,11 @@
 #include <type_traits>
 #include <vector>
 
-#include <membrane/accuracy/contact_bounds.hpp>
-#include <membrane/accuracy/convexity.hpp>
 #include <membrane/accuracy/equilibrium_problem.hpp>
-#include <membrane/accuracy/error_report.hpp>
 #include <membrane/accuracy/stiffness_operator.hpp>
+#include <membrane/certify/contact_bounds.hpp>
+#include <membrane/certify/convexity.hpp>
+#include <membrane/certify/error_report.hpp>
 
 /// A proven bound of the distance of a membrane from equilibrium.
 ///

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include <membrane/accuracy/block_cholesky.hpp>
-#include <membrane/accuracy/convexity.hpp>
+#include <membrane/certify/convexity.hpp>
 
 /// The sharper of two bounds of the convexity of a membrane's energy, for soft foundations.
 ///
-///     #include <membrane/accuracy/factored_convexity.hpp>
+///     #include <membrane/certify/factored_convexity.hpp>
 ///     membrane::ErrorBound<FactoredConvexity> bound(network);
 namespace membrane {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/accuracy/factored_convexity.hpp>
+#include <membrane/certify/factored_convexity.hpp>
 
 #include "support/catch.hpp"
 #include "support/convexity_check.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/accuracy/contact_bounds.hpp>
+#include <membrane/certify/contact_bounds.hpp>
 
 #include <algorithm>
 #include <array>
@@ -9,8 +9,8 @@
 #include <sstream>
 #include <vector>
 
-#include <membrane/accuracy/error_bound.hpp>
-#include <membrane/accuracy/factored_convexity.hpp>
+#include <membrane/certify/error_bound.hpp>
+#include <membrane/certify/factored_convexity.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

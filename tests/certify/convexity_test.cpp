@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/accuracy/convexity.hpp>
+#include <membrane/certify/convexity.hpp>
 
 #include <cmath>
 
