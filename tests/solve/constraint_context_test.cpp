@@ -94,7 +94,7 @@ TEST_CASE("prescribed and pinned vertices are fixed until the step ends, and a p
     SixPoints scene;
     ConstraintContext<double> context(scene.x, scene.work, scene);
     const Points<double> before = scene.points;
-    for (const Index v : {0, 1, 5}) scene.work.set_compliance(v, diagonal3(0.5), 0.5);
+    for (const Index v : {0, 1, 5}) scene.work.set_response(v, {diagonal3(0.5)}, 0.5);
     CHECK(context.fixed(5));
     CHECK_FALSE(context.fixed(1));
     context.move(1, {1, 1, 1});

@@ -36,8 +36,7 @@ struct Patch {
             state.load(v, start, NonePinned{});
             Symmetric3<S> block = diagonal3(random.number(S(0.1), S(1)));
             block += outer<S>(random.number(S(0), S(2)), random.unit_vector<S>());
-            state.set_compliance(v, block, S(0.1));
-            state.set_internal(v, S(100), S(100));
+            state.set_response(v, {block, S(100), S(100)}, S(0.1));
             state.forced.insert(v);
         }
         for (Index f = 0; f < triangles; ++f) {
@@ -238,8 +237,8 @@ TEMPLATE_TEST_CASE("one pass closes the gap as far as the compliance of the corn
             for (std::size_t k = 0; k < 3; ++k) {
                 const Index v = point.corners[k];
                 const S weight = point.weights[static_cast<Eigen::Index>(k)];
-                const Vector3<S> by = state.compliance_block(v) * Vector3<S>(weight * point.force);
-                compliance += weight * weight * dot<S>(point.normal, state.compliance_block(v) * point.normal);
+                const Vector3<S> by = state.response_of(v).compliance * Vector3<S>(weight * point.force);
+                compliance += weight * weight * dot<S>(point.normal, state.response_of(v).compliance * point.normal);
                 const Vector3<S> moved = membrane::point(state.positions(), v) - membrane::point(patch.x, v);
                 REQUIRE(norm<S>(moved - by) <= slack * (1 + force));
             }
@@ -256,7 +255,7 @@ TEMPLATE_TEST_CASE("a point that presses far harder than what resists at it is l
     Random random(1);
     Patch<S> patch(random, 4, random_tool<S>(random, false));
     auto& state = patch.state;
-    for (Index v = 0; v < patch.x.cols(); ++v) state.set_internal(v, 0, 0);
+    for (Index v = 0; v < patch.x.cols(); ++v) state.set_response(v, {state.response_of(v).compliance, 0, 0}, S(0.1));
     const auto pass = solve_contacts(state, patch.shape(), state.packs.items());
     CHECK(pass.released);
     CHECK(pass.largest == 0);

@@ -52,28 +52,52 @@ TEST_CASE("positions are set without the number beside them, and restored but wh
     StepState<double> state(8, 4);
     state.begin_step();
     for (Index v = 0; v < 8; ++v) state.load(v, x, OnePinned{});
-    state.set_compliance(2, {1, 2, 3, 4, 5, 6}, 0.5);
-    state.set_internal(2, 7, 8);
+    state.set_response(2, {{1, 2, 3, 4, 5, 6}, 7, 8}, 0.5);
     state.set_position(2, {1, 1, 1});
     state.set_position(4, {2, 2, 2});
     state.prescribed.insert(4);
     CHECK(state.compliance(2) == 0.5);
-    const auto block = state.compliance_block(2);
+    const auto response = state.response_of(2);
+    const auto& block = response.compliance;
     CHECK(block.xx == 1);
     CHECK(block.yy == 2);
     CHECK(block.zz == 3);
     CHECK(block.xy == 4);
     CHECK(block.xz == 5);
     CHECK(block.yz == 6);
-    CHECK(state.row(state.response, 5).point().z() == 7);
-    CHECK(state.row(state.response, 5).extra() == 8);
+    CHECK(response.internal_force == 7);
+    CHECK(response.internal_stiffness == 8);
     state.restore(x);
     CHECK(point(state.positions(), 2) == point(x, 2));
     CHECK(point(state.positions(), 4) == Vector3<double>(2, 2, 2));
     state.clear_response(2);
-    CHECK(state.compliance_block(2).trace() == 0);
+    CHECK(state.response_of(2).compliance.trace() == 0);
     CHECK(state.compliance(2) == 0);
     CHECK(point(state.positions(), 2) == point(x, 2));
+}
+
+TEST_CASE("responses in lanes are those of each vertex", "[state]") {
+    constexpr std::size_t lanes = Lanes<double>::count;
+    StepState<double> state(8, 4);
+    const auto number = [](Index v, int k) { return 10 * v + k; };
+    for (Index v = 0; v < 8; ++v) {
+        const auto n = [&](int k) { return static_cast<double>(number(v, k)); };
+        state.set_response(v, {{n(0), n(1), n(2), n(3), n(4), n(5)}, n(6), n(7)}, 0.5);
+    }
+    StepState<double>::Begins begins, reversed;
+    for (std::size_t i = 0; i < lanes; ++i) {
+        begins[i] = begin_of_row(static_cast<Index>((3 * i + 1) % 8));
+        reversed[i] = begin_of_row(7 - row_at(begins[i]));
+    }
+    state.set_responses(reversed, state.responses(begins));
+    for (std::size_t i = 0; i < lanes; ++i) {
+        const auto found = state.response_of(row_at(reversed[i]));
+        const Index from = row_at(begins[i]);
+        CHECK(found.compliance.xy == number(from, 3));
+        CHECK(found.compliance.yz == number(from, 5));
+        CHECK(found.internal_force == number(from, 6));
+        CHECK(found.internal_stiffness == number(from, 7));
+    }
 }
 
 TEST_CASE("a step begins without forces, and keeps the stiffness of supports", "[state]") {
@@ -142,7 +166,7 @@ TEST_CASE("what is kept turns with the body", "[state]") {
     const Points<double> x = Points<double>::Random(3, 4);
     state.begin_step();
     state.load(1, x, OnePinned{});
-    state.set_compliance(1, {1, 2, 3, 0, 0, 0}, 0.5);
+    state.set_response(1, {{1, 2, 3, 0, 0, 0}, 7, 8}, 0.5);
     auto point = point_at_corner(0, 0, 1);
     point.force = {1, 0, 0};
     REQUIRE(state.points.try_push_back(point));
@@ -152,8 +176,11 @@ TEST_CASE("what is kept turns with the body", "[state]") {
     state.rotate(quarter);
     CHECK(norm<double>(state.previous_points[0].force - Vector3<double>(0, 1, 0)) < 1e-15);
     CHECK(norm<double>(state.previous_points[0].normal - Vector3<double>(0, 0, 1)) < 1e-15);
-    CHECK(state.compliance_block(1).xx == Approx(2));
-    CHECK(state.compliance_block(1).yy == Approx(1));
-    CHECK(state.compliance_block(1).zz == Approx(3));
+    const auto turned = state.response_of(1);
+    CHECK(turned.compliance.xx == Approx(2));
+    CHECK(turned.compliance.yy == Approx(1));
+    CHECK(turned.compliance.zz == Approx(3));
+    CHECK(turned.internal_force == 7);
+    CHECK(turned.internal_stiffness == 8);
     CHECK(state.compliance(1) == 0.5);
 }

@@ -32,7 +32,7 @@ struct Membrane {
         for (Index v = 0; v < 3; ++v) {
             membrane::Symmetric3<double> compliance = membrane::diagonal3(random.number(0.1, 2.0));
             compliance += membrane::outer(random.number(0.0, 5.0), random.vector());
-            work.set_compliance(v, compliance, 0.1);
+            work.set_response(v, {compliance}, 0.1);
             context.load(v);
         }
     }

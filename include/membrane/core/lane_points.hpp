@@ -127,8 +127,14 @@ class PaddedVector {
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
-/// Numbers in a padded point: row r begins at number 4 r.
+/// Numbers in a padded point.
 inline constexpr Index numbers_in_point = 4;
+
+///@{
+/// Number at which a row of padded points begins, and the row that begins there.
+[[nodiscard]] constexpr Index begin_of_row(Index row) noexcept { return numbers_in_point * row; }
+[[nodiscard]] constexpr Index row_at(Index begin) noexcept { return begin / numbers_in_point; }
+///@}
 
 /// In lane i the point of `rows` that begins at number `begins[i]`.
 template <Real Scalar>

@@ -92,7 +92,7 @@ class ConstraintContext {
 
     /// Response of a vertex of layer 0 to `force` by its last update [m]; zero if it is fixed.
     [[nodiscard]] Vector3<Scalar> response(Index v, const Vector3<Scalar>& force) const noexcept {
-        return fixed(v) ? Vector3<Scalar>(Vector3<Scalar>::Zero()) : state_.compliance_block(v) * force;
+        return fixed(v) ? Vector3<Scalar>(Vector3<Scalar>::Zero()) : state_.response_of(v).compliance * force;
     }
 
     /// Lower bound of the compliance of `v` by its last update [m/N]; zero if it is fixed.

@@ -86,7 +86,7 @@ class ContactPacks {
     ContactPacks(Index vertex_count, std::size_t capacity)
         : packs_(capacity),
           colours_(static_cast<std::size_t>(vertex_count), 0),
-          unused_row_(numbers_in_point * vertex_count) {}
+          unused_row_(begin_of_row(vertex_count)) {}
 
     /// Removes all packs.
     void clear() noexcept { packs_.clear(); }
@@ -152,7 +152,7 @@ void ContactPacks<Scalar>::add_lane(ContactPack<Scalar>& pack, const ContactPoin
     for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t corner = (k + turn) % 3;
         const auto row = static_cast<Eigen::Index>(k);
-        pack.corner[k][i] = numbers_in_point * point.corners[corner];
+        pack.corner[k][i] = begin_of_row(point.corners[corner]);
         pack.load.weights[row].set(i, point.weights[static_cast<Eigen::Index>(corner)]);
         pack.load.normal[row].set(i, point.normal[row]);
         pack.free[row].set(i, is_fixed(point.corners[corner]) ? Scalar(0) : Scalar(1));

@@ -224,7 +224,7 @@ MEMBRANE_INLINE void add_forces(StepState<Scalar>& state, ContactPack<Scalar>& p
         scatter_padded(row, state.force.data(), pack.corner[k].data());
         if (!pack.on_fixed) return;
         for (std::size_t lane = 0; lane < Wide::count; ++lane) {
-            const auto v = static_cast<std::size_t>(pack.corner[k][lane] / numbers_in_point);
+            const auto v = static_cast<std::size_t>(row_at(pack.corner[k][lane]));
             state.added_stiffness[v] += corners_at_once * stiffer[lane];
         }
         auto support = gather_padded(state.support.data(), pack.corner[k].data());
@@ -320,22 +320,17 @@ template <Real Scalar>
     response.balanced_force = support.force;
     response.internal_stiffness = support.stiffness;
     each_corner([&](std::size_t k) {
-        std::array<Index, Wide::count> begins;
-        for (std::size_t i = 0; i < Wide::count; ++i) begins[i] = 2 * pack.corner[k][i];
-        const auto a = gather_padded(state.response.data(), begins.data());
-        const auto b = gather_padded(state.response.data() + 1, begins.data());
-        const Symmetric3<Wide> block{a.point[0], a.point[1], a.point[2], a.extra, b.point[0], b.point[1]};
-        const Wide &internal_force = b.point[2], &internal_stiffness = b.extra;
+        const auto corner = state.responses(pack.corner[k]);
         const Wide& weight = pack.load.weights[static_cast<Eigen::Index>(k)];
-        response.of_corner[k] = weight * (block * pack.load.normal);
+        response.of_corner[k] = weight * (corner.compliance * pack.load.normal);
         response.compliance += weight * dot(response.of_corner[k], pack.load.normal);
-        response.balanced_force += internal_force;
+        response.balanced_force += corner.internal_force;
         if (state.has_external_forces) {
             response.balanced_force += Wide::of([&](std::size_t i) {
-                return state.external_force[static_cast<std::size_t>(pack.corner[k][i] / numbers_in_point)];
+                return state.external_force[static_cast<std::size_t>(row_at(pack.corner[k][i]))];
             });
         }
-        response.internal_stiffness += internal_stiffness;
+        response.internal_stiffness += corner.internal_stiffness;
     });
     return response;
 }
@@ -458,7 +453,7 @@ Scalar largest_squared_move(const StepState<Scalar>& state, std::span<const Inde
     std::array<Index, Wide::count> begins;
     for (std::size_t first = 0; first < vertices.size(); first += Wide::count) {
         for (std::size_t i = 0; i < Wide::count; ++i) {
-            begins[i] = numbers_in_point * vertices[(std::min)(first + i, vertices.size() - 1)];
+            begins[i] = begin_of_row(vertices[(std::min)(first + i, vertices.size() - 1)]);
         }
         const Vector3<Wide> by =
             gather(state.position.data(), begins.data()) - gather(state.anchor.data(), begins.data());

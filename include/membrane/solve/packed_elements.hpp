@@ -200,7 +200,7 @@ MEMBRANE_INLINE void PackedElements<Scalar>::fill_lane(Slot<E>& slot, std::size_
         slot.vertex[lane] = at.corners[place];
     }
     for (std::size_t k = 0; k < E::corner_count; ++k) {
-        if (k != place) slot.others[k - (k > place)][lane] = numbers_in_point * at.corners[k];
+        if (k != place) slot.others[k - (k > place)][lane] = begin_of_row(at.corners[k]);
     }
 }
 

@@ -241,7 +241,7 @@ class PackedVertices {
 template <Real Scalar>
 template <ElasticNetwork<Scalar> Network>
 PackedVertices<Scalar>::PackedVertices(const Network& network, Index capacity)
-    : unused_row_(numbers_in_point * network.vertex_count()),
+    : unused_row_(begin_of_row(network.vertex_count())),
       members_(static_cast<std::size_t>((std::min)(network.vertex_count(), capacity))),
       packs_(packs_for(members_.capacity())),
       terms_(packs_.capacity()),
@@ -313,7 +313,7 @@ bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const 
     if (members_.size() + vertices.size() > members_.capacity() || slot_count_ + springs > slots_.size()) return false;
     Pack pack{members_.size(), vertices.size(), slot_count_, springs, {}, false};
     pack.own.fill(unused_row_);
-    for (std::size_t i = 0; i < vertices.size(); ++i) pack.own[i] = numbers_in_point * vertices[i];
+    for (std::size_t i = 0; i < vertices.size(); ++i) pack.own[i] = begin_of_row(vertices[i]);
     if (!elements_.append(vertices, pack.own, network) || !packs_.try_push_back(pack)) return false;
     const auto own_slots = std::span(slots_).subspan(slot_count_, springs);
     for (Slot& slot : own_slots) slot = {Scalar(0), Scalar(1), pack.own};
@@ -324,7 +324,7 @@ bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const 
         for (const auto& spring : network.springs_of(vertices[i])) {
             slot->stiffness.set(i, spring.stiffness);
             slot->rest_length.set(i, spring.rest_length);
-            slot->other[i] = numbers_in_point * spring.other;
+            slot->other[i] = begin_of_row(spring.other);
             ++slot;
         }
         for (const auto& neighbour : network.neighbours(vertices[i])) need(neighbour.other);
@@ -421,14 +421,12 @@ MEMBRANE_INLINE void PackedVertices<Scalar>::keep_response(std::size_t p, const 
                                                            StepState<Scalar>& rows) const noexcept {
     const auto may_move = terms_[p].free != 0;
     const auto kept = [&](const Wide& number) { return select<Wide>(may_move, number, 0); };
-    Begins begins;
-    for (std::size_t i = 0; i < lanes; ++i) begins[i] = 2 * packs_[p].own[i];
-    scatter_padded<Scalar>({{kept(block.xx), kept(block.yy), kept(block.zz)}, kept(block.xy)}, rows.response.data(),
-                           begins.data());
     const Wide internal_force = norm<Wide>(at.vertex.force - at.constraint_force);
     const Wide internal_stiffness = at.vertex.stiffness - at.vertex.contact_stiffness - at.added_stiffness;
-    scatter_padded<Scalar>({{kept(block.xz), kept(block.yz), kept(internal_force)}, kept(internal_stiffness)},
-                           rows.response.data() + 1, begins.data());
+    rows.set_responses(packs_[p].own, {{kept(block.xx), kept(block.yy), kept(block.zz), kept(block.xy), kept(block.xz),
+                                        kept(block.yz)},
+                                       kept(internal_force),
+                                       kept(internal_stiffness)});
 }
 
 // Evaluates the forces on the vertices of a pack.
@@ -453,8 +451,8 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene
         const auto of_constraints = gather_padded(rows.force.data(), own.data());
         const Wide contact_stiffness = larger<Wide>(of_constraints.extra, 0);
         at.constraint_force = of_constraints.point;
-        at.added_stiffness = Wide::of(
-            [&](std::size_t i) { return rows.added_stiffness[static_cast<std::size_t>(own[i] / numbers_in_point)]; });
+        at.added_stiffness =
+            Wide::of([&](std::size_t i) { return rows.added_stiffness[static_cast<std::size_t>(row_at(own[i]))]; });
         at.others.force += at.constraint_force;
         at.others.stiffness += contact_stiffness + at.added_stiffness;
         if constexpr (in_contact) {

@@ -33,6 +33,14 @@ struct ListRange {
     }
 };
 
+/// What the last update of a vertex in layer 0 found, or of several.
+template <Number N>
+struct VertexResponse {
+    Symmetric3<N> compliance;  ///< [m/N]
+    N internal_force = 0;      ///< size of the force without constraints [N]
+    N internal_stiffness = 0;  ///< without contacts [N/m]
+};
+
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
 /// The state of a step, and what it keeps for the next one: for each vertex a row of four numbers in each of several
@@ -40,7 +48,7 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 /// written at the end of the step: until then they are the start positions.
 ///
 /// A row is up to date if its vertex has been loaded in this step. `compliance` is that of the vertex's last update in
-/// any step, `compliance_block` that of its last update in layer 0.
+/// any step, `response_of` that of its last update in layer 0.
 template <Real Scalar>
 struct StepState {
     /// The largest number of constraints of one step.
@@ -160,32 +168,38 @@ struct StepState {
     [[nodiscard]] Scalar compliance(Index v) const noexcept { return row(position, v).extra(); }
 
     ///@{
-    /// Results of the last update of `v` in layer 0: its compliance [m/N], and by `set_internal` its internal force [N]
-    /// and internal stiffness [N/m], without contacts.
-    [[nodiscard]] Symmetric3<Scalar> compliance_block(Index v) const noexcept {
+    /// The response of `v`; zero if it is fixed. `compliance` is the lower bound by the same update.
+    [[nodiscard]] VertexResponse<Scalar> response_of(Index v) const noexcept {
         const auto& a = row(response, 2 * v).number;
         const auto& b = row(response, 2 * v + 1).number;
-        return {a[0], a[1], a[2], a[3], b[0], b[1]};
+        return {{a[0], a[1], a[2], a[3], b[0], b[1]}, b[2], b[3]};
     }
-    void set_compliance(Index v, const Symmetric3<Scalar>& block, Scalar least) noexcept {
+    void set_response(Index v, const VertexResponse<Scalar>& one, Scalar compliance) noexcept {
+        const auto& block = one.compliance;
         row(response, 2 * v).number = {block.xx, block.yy, block.zz, block.xy};
-        row(response, 2 * v + 1).number[0] = block.xz;
-        row(response, 2 * v + 1).number[1] = block.yz;
-        row(position, v).number[3] = least;
+        row(response, 2 * v + 1).number = {block.xz, block.yz, one.internal_force, one.internal_stiffness};
+        row(position, v).number[3] = compliance;
     }
+    void clear_response(Index v) noexcept { set_response(v, {}, 0); }
     ///@}
 
-    /// Sets the response of `v` to zero.
-    void clear_response(Index v) noexcept {
-        row(response, 2 * v) = row(response, 2 * v + 1) = {};
-        row(position, v).number[3] = 0;
-    }
+    using Begins = std::array<Index, Lanes<Scalar>::count>;  ///< in each lane, where the row of a vertex begins
 
-    /// Sets the internal force [N] and stiffness [N/m] of `v`, see `compliance_block`.
-    void set_internal(Index v, Scalar size, Scalar stiffness) noexcept {
-        row(response, 2 * v + 1).number[2] = size;
-        row(response, 2 * v + 1).number[3] = stiffness;
+    ///@{
+    /// The responses of several vertices, one in each lane.
+    [[nodiscard]] MEMBRANE_INLINE VertexResponse<Lanes<Scalar>> responses(const Begins& begins) const noexcept {
+        const Begins at = response_begins(begins);
+        const auto a = gather_padded(response.data(), at.data()), b = gather_padded(response.data() + 1, at.data());
+        return {{a.point[0], a.point[1], a.point[2], a.extra, b.point[0], b.point[1]}, b.point[2], b.extra};
     }
+    MEMBRANE_INLINE void set_responses(const Begins& begins, const VertexResponse<Lanes<Scalar>>& all) noexcept {
+        const Begins at = response_begins(begins);
+        const auto& block = all.compliance;
+        scatter_padded<Scalar>({{block.xx, block.yy, block.zz}, block.xy}, response.data(), at.data());
+        scatter_padded<Scalar>({{block.xz, block.yz, all.internal_force}, all.internal_stiffness}, response.data() + 1,
+                               at.data());
+    }
+    ///@}
 
     /// Finds the vertices shared by points of several constraints. Cost: linear in the points.
     void find_shared() noexcept;
@@ -194,13 +208,13 @@ struct StepState {
     void index_previous_points() noexcept;
 
     // One row more than vertices, for unused lanes. Three numbers, and the fourth:
-    Rows position;  ///< `position_of`, `compliance`
-    Rows force;     ///< `constraint_force`, `contact_stiffness`
-    Rows response;  ///< two rows: compliance xx, yy, zz, xy; xz, yz [m/N], internal force [N], internal stiffness [N/m]
-    Rows support;   ///< of fixed and shared vertices: `support_force`, `support_stiffness`
-    Rows opposing;  ///< of fixed and shared vertices: `opposing_force`
-    Rows residual;  ///< `residual_force`, `unbalanced_force`
-    Rows anchor;    ///< positions to which `kept` vertices go back [m]
+    Rows position;                        ///< `position_of`, `compliance`
+    Rows force;                           ///< `constraint_force`, `contact_stiffness`
+    Rows response;                        ///< two rows for each vertex, of `response_of`
+    Rows support;                         ///< of fixed and shared vertices: `support_force`, `support_stiffness`
+    Rows opposing;                        ///< of fixed and shared vertices: `opposing_force`
+    Rows residual;                        ///< `residual_force`, `unbalanced_force`
+    Rows anchor;                          ///< positions to which `kept` vertices go back [m]
     std::vector<Scalar> added_stiffness;  ///< that constraints add in all directions [N/m]
     std::vector<Scalar> external_force;   ///< sum of the sizes of forces given in this step, as by `PointLoad` [N]
     bool has_external_forces = false;     ///< in this step
@@ -240,7 +254,13 @@ struct StepState {
     Index invalid_constraint = no_index;       ///< number of the one that was invalid first
     Index splits = 0;                          ///< of a tear, until now
     StepStatus missed = StepStatus::advanced;  ///< a part has followed fewer
-    ///@}
+                                               ///@}
+
+  private:
+    [[nodiscard]] MEMBRANE_INLINE static Begins response_begins(Begins begins) noexcept {
+        for (Index& begin : begins) begin *= 2;
+        return begins;
+    }
 };
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
@@ -387,8 +407,9 @@ void StepState<Scalar>::rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noex
         point.force = turned.vector_to_world(point.force);
     }
     for (const Index v : loaded.items()) {  // in the last step
-        const Symmetric3<Scalar> block = rotated(compliance_block(v), rotation);
-        set_compliance(v, block, compliance(v));
+        auto kept = response_of(v);
+        kept.compliance = rotated(kept.compliance, rotation);
+        set_response(v, kept, compliance(v));
     }
 }
 

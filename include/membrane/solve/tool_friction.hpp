@@ -260,7 +260,7 @@ void ToolFriction<Scalar>::read_normal_forces(const Context& context) noexcept {
             const Vector3<Scalar> force =
                 -pack.load.force[i] * Vector3<Scalar>(normal[0][i], normal[1][i], normal[2][i]);
             for (std::size_t k = 0; k < 3; ++k) {
-                auto* const v = find(vertices_.items(), pack.corner[k][i] / numbers_in_point);
+                auto* const v = find(vertices_.items(), row_at(pack.corner[k][i]));
                 if (v == nullptr) continue;
                 v->normal_force += pack.load.weights[static_cast<Eigen::Index>(k)][i] * force;
             }
