@@ -28,20 +28,20 @@ struct Field {
         : mesh(sphere_of<Scalar>(vertices)),
           network(mesh, {}, {.stiffness = Scalar(stiffness), .mass = Scalar(4e-4)}),
           volume(mesh, {.stiffness = Scalar(foundation)}),
-          state(mesh.vertex_count(), 0) {
+          rows(mesh.vertex_count()) {
         std::mt19937_64 random(1);
         for (Index v = 0; v < x.cols(); ++v) {
             for (int k = 0; k < 3; ++k)
                 x(k, v) += static_cast<Scalar>(0.05 * radius * (static_cast<double>(random() % 2001) / 1000 - 1));
         }
         const membrane::ConstPointsRef<Scalar> start = x;
-        for (Index v = 0; v < x.cols(); ++v) state.load(v, start, network);
+        for (Index v = 0; v < x.cols(); ++v) rows.load(v, start, network);
     }
 
     membrane::TriangleMesh<Scalar> mesh;
     membrane::MassSpringNetwork<Scalar, membrane::LinearSpring> network;
     membrane::VirtualVolumeSprings<Scalar> volume;
-    membrane::StepState<Scalar> state;
+    membrane::VertexRows<Scalar> rows;
     membrane::Points<Scalar> x = mesh.positions();
 };
 
@@ -125,9 +125,9 @@ void plain(benchmark::State& state) {
 template <Real Scalar, class Rule>
 void packs(benchmark::State& state) {
     Field<Scalar> field(state.range(0));
-    const membrane::ConstPointsRef<Scalar> start = field.x, now = field.state.positions();
+    const membrane::ConstPointsRef<Scalar> start = field.x, now = field.rows.positions();
     const membrane::StepInput<Scalar, decltype(field.network), decltype(field.volume)> scene{
-        start, now, Scalar(tick), field.network, field.volume, field.state};
+        start, now, Scalar(tick), field.network, field.volume, field.rows};
     const Index seed = 0;
     membrane::PropagationQueue queue(field.mesh.vertex_count());
     queue.build(field.network, std::span(&seed, 1), membrane::unlimited);

@@ -51,7 +51,8 @@
     PREFIX struct membrane::SolverOptions<SCALAR>;                                                               \
     PREFIX class membrane::PackedVertices<SCALAR>;                                                               \
     PREFIX class membrane::ContactPacks<SCALAR>;                                                                 \
-    PREFIX struct membrane::StepState<SCALAR>;                                                                   \
+    PREFIX struct membrane::VertexRows<SCALAR>;                                                                  \
+    PREFIX struct membrane::ContactState<SCALAR>;                                                                \
     PREFIX class membrane::ConstraintContext<SCALAR>;                                                            \
     PREFIX struct membrane::ToolContact<SCALAR>;                                                                 \
     PREFIX struct membrane::PointAttachment<SCALAR>;                                                             \

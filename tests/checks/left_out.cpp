@@ -243,7 +243,7 @@ int main(int argc, char** argv) {
     const membrane::NoFoundation none;
     const std::vector<S> stiffnesses(static_cast<std::size_t>(mesh.vertex_count()), foundation);
     const NoDamping undamped{&springs.anchors(), &stiffnesses};
-    membrane::StepState<S> state(mesh.vertex_count(), 0);
+    membrane::VertexRows<S> of_vertices(mesh.vertex_count());
 
     Points start = mesh.positions();
     std::mt19937_64 random(1);
@@ -271,10 +271,10 @@ int main(int argc, char** argv) {
     packed.assign(queue.vertices(), queue.colour_ends(), network);
     const auto in_state = [&](const auto& volume, const auto& act) {
         return [&](Points& x) {
-            const membrane::ConstPointsRef<S> begin = start, now = state.positions();
-            state.begin_step();
-            for (Index v = 0; v < x.cols(); ++v) state.load(v, begin, network);
-            const SceneOf<std::remove_cvref_t<decltype(volume)>> scene{begin, now, dt, network, volume, state};
+            const membrane::ConstPointsRef<S> begin = start, now = of_vertices.positions();
+            of_vertices.begin_step();
+            for (Index v = 0; v < x.cols(); ++v) of_vertices.load(v, begin, network);
+            const SceneOf<std::remove_cvref_t<decltype(volume)>> scene{begin, now, dt, network, volume, of_vertices};
             packed.begin_step(scene);
             act(packed, scene);
             x = now;
@@ -286,7 +286,7 @@ int main(int argc, char** argv) {
         [&](Points& x) { energy_bare(network_without_energy, start, x); });
     const Rows rows(network, packed);
     compare("by_hand", in_state(none, by_hand_ours),
-            in_state(none, [&](Packed&, const auto& scene) { by_hand_bare(rows, scene.state.position.data()); }));
+            in_state(none, [&](Packed&, const auto& scene) { by_hand_bare(rows, scene.rows.position.data()); }));
     const Tearable tissue = tearable(mesh);
     const membrane::Tearing<S> tear(mesh, membrane::EnergyRelease{.toughness = 1e3, .thickness = 1e-5});
     compare(

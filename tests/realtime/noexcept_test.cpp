@@ -129,12 +129,14 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", TEST_S
         static_assert(noexcept(packed.template update<false>(0, 1, scene, BlockStep{}, true, executor)));
         static_assert(noexcept(packed.free_count(0))&& noexcept(packed.needed()));
     });
-    static_cast<void>([](StepState<S>& state, const ContactTool<S>& tool, std::span<ContactPack<S>> packs,
-                         std::span<ContactPoint<S>> points, std::span<const Index> vertices) {
-        static_assert(noexcept(state.begin_step())&& noexcept(state.end_step())&& noexcept(state.reset()));
-        static_assert(noexcept(push_out(state, tool, packs))&& noexcept(solve_contacts(state, tool, packs)));
-        static_assert(noexcept(apply_forces(state, packs))&& noexcept(state.packs.unpack(points)));
-        static_assert(noexcept(largest_squared_move(state, vertices)));
+    static_cast<void>([](VertexRows<S>& rows, ContactState<S>& contacts, const ContactTool<S>& tool,
+                         std::span<ContactPack<S>> packs, std::span<ContactPoint<S>> points) {
+        static_assert(noexcept(rows.begin_step())&& noexcept(rows.reset()));
+        static_assert(noexcept(contacts.begin_step())&& noexcept(contacts.end_step())&& noexcept(contacts.reset()));
+        static_assert(noexcept(push_out(rows, contacts, tool, packs)));
+        static_assert(noexcept(solve_contacts(rows, contacts, tool, packs)));
+        static_assert(noexcept(apply_forces(rows, contacts, packs))&& noexcept(contacts.packs.unpack(points)));
+        static_assert(noexcept(largest_squared_move(rows, contacts)));
     });
     static_cast<void>([](Predictor<S, 4>& predictor, std::span<const DrivingInput<S>> inputs) {
         static_assert(noexcept(predictor.extrapolation_factor(inputs))&& noexcept(predictor.reset()));

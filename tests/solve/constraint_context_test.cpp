@@ -19,9 +19,14 @@ struct SixPoints {
     Index pinned_vertex = 5;
     Points<double> points = Points<double>::Random(3, 6);
     ConstPointsRef<double> x{points};
-    StepState<double> work{6, 3};
+    VertexRows<double> work{6};
+    ContactState<double> contacts{6, 3};
 
-    SixPoints() { work.begin_step(); }
+    SixPoints() { begin_step(); }
+    void begin_step() {
+        work.begin_step();
+        contacts.begin_step();
+    }
 };
 
 ContactPoint<double> point_of(Index triangle, int feature, double force = 1) {
@@ -34,22 +39,30 @@ std::vector<Index> as_vector(std::span<const Index> items) { return {items.begin
 
 TEST_CASE("a context knows its vertices", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene);
+    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
     for (Index v = 0; v < 6; ++v) {
         CHECK(context.validate(v));
         CHECK(context.position(v) == point(scene.points, v));
     }
-    CHECK_FALSE(scene.work.invalid);
+    CHECK(context.refusal() == StepStatus::advanced);
     for (const Index wrong : {-1, 6, 1000, unlimited}) {
-        scene.work.begin_step();
-        CHECK_FALSE(context.validate(wrong));
-        CHECK(scene.work.invalid);  // the step will be refused
+        ConstraintContext<double> other(scene.x, scene.work, scene.contacts, scene);
+        other.select_constraint(3);
+        CHECK_FALSE(other.validate(wrong));
+        other.select_constraint(4);
+        CHECK_FALSE(other.validate(wrong));
+        CHECK(other.refusal() == StepStatus::invalid_input);
+        CHECK(other.invalid_constraint() == 3);
+        other.refuse_points();
+        CHECK(other.refusal() == StepStatus::invalid_input);
+        other.compare_splits(-1, StepStatus::network_missed_split);
+        CHECK(other.refusal() == StepStatus::network_missed_split);
     }
 }
 
 TEST_CASE("what is moved is moved in the step, and the positions of the user stay", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene);
+    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
     const Points<double> before = scene.points;
     context.move(2, {1, 0, 0});
     context.move(2, {0, 1, 0});
@@ -60,39 +73,14 @@ TEST_CASE("what is moved is moved in the step, and the positions of the user sta
     CHECK(as_vector(scene.work.loaded.items()) == std::vector<Index>{2, 4});
     CHECK(scene.points == before);
 
-    scene.work.begin_step();  // the next step
+    scene.begin_step();  // the next step
     CHECK(scene.work.loaded.empty());
     CHECK(context.position(2) == point(before, 2));
 }
 
-TEST_CASE("vertices go back to where they were kept, or to where the step began, but fixed ones do not", "[context]") {
-    SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene);
-    const Vector3<double> by(1, 2, 3);
-    context.move(0, by);
-    context.keep(0);
-    context.move(0, by);
-    context.move(1, by);
-    context.keep_start(2);
-    context.move(2, by);
-    context.prescribe(3, context.start(3) + by);
-    CHECK(context.kept(0) == context.start(0) + by);
-    CHECK(context.kept(1) == context.start(1));
-    CHECK(context.kept(2) == context.start(2));
-    context.keep_start(0);  // it is kept already
-    CHECK(context.kept(0) == context.start(0) + by);
-    context.go_back(0.5);
-    CHECK(norm<double>(context.position(0) - context.start(0) - 1.5 * by) < 1e-15);
-    CHECK(norm<double>(context.position(1) - context.start(1) - 0.5 * by) < 1e-15);
-    CHECK(norm<double>(context.position(2) - context.start(2) - 0.5 * by) < 1e-15);
-    CHECK(norm<double>(context.position(3) - context.start(3) - by) < 1e-15);
-    context.go_back(1);
-    CHECK(context.position(1) == context.start(1));
-}
-
 TEST_CASE("prescribed and pinned vertices are fixed until the step ends, and a pinned one stays", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene);
+    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
     const Points<double> before = scene.points;
     for (const Index v : {0, 1, 5}) scene.work.set_response(v, {diagonal3(0.5)}, 0.5);
     CHECK(context.fixed(5));
@@ -115,7 +103,7 @@ TEST_CASE("prescribed and pinned vertices are fixed until the step ends, and a p
     CHECK(context.compliance(5) == 0);
     CHECK(context.response(0, {2, 0, 0}) == Vector3<double>(1, 0, 0));
     CHECK(context.response(1, {2, 0, 0}) == Vector3<double>(0, 0, 0));
-    scene.work.begin_step();
+    scene.begin_step();
     CHECK_FALSE(context.fixed(1));
     CHECK_FALSE(context.prescribed(1));
     CHECK(context.fixed(5));
@@ -123,7 +111,7 @@ TEST_CASE("prescribed and pinned vertices are fixed until the step ends, and a p
 
 TEST_CASE("forces add up, and are taken back with the step", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene);
+    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
     context.add_force(3, {1, 2, 3});
     context.add_force(3, {1, 0, 0});
     context.add_force(0, {0, 0, 5});
@@ -134,48 +122,34 @@ TEST_CASE("forces add up, and are taken back with the step", "[context]") {
     CHECK(force(0).point() == Vector3<double>(0, 0, 5));
     CHECK(force(0).extra() == 0);
     CHECK(scene.work.added_stiffness[0] == 3);
-    scene.work.begin_step();
+    scene.begin_step();
     for (Index v = 0; v < 6; ++v) CHECK(force(v).number == std::array<double, 4>{});
     CHECK(scene.work.added_stiffness == std::vector<double>(7, 0.0));
 }
 
-TEST_CASE("a fixed vertex yields to tools by force over stiffness, a free one does not", "[context]") {
-    SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene);
-    for (const Index v : {1, 5}) scene.work.set_support_stiffness(v, 4);
-    for (const Index v : {1, 5}) context.add_support_force(v, {0, 0, 2});
-    CHECK(context.support_displacement(5) == Vector3<double>(0, 0, 0.5));
-    CHECK(context.support_compliance(5) == 0.25);
-    CHECK(context.support_displacement(1) == Vector3<double>(0, 0, 0));
-    CHECK(context.support_compliance(1) == 0);
-    scene.work.begin_step();
-    CHECK(context.support_displacement(5) == Vector3<double>(0, 0, 0));
-    CHECK(context.support_compliance(5) == 0.25);
-}
-
 TEST_CASE("forces and stiffnesses that are added, either alone too, last until the step ends", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene);
+    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
     context.add_force(1, {1, 2, 3});
     for (const Index v : {2, 2, 4}) context.add_stiffness(v, 0.5);
     CHECK(as_vector(scene.work.forced.items()) == std::vector<Index>{1, 2, 4});
     CHECK(scene.work.constraint_force(1) == Vector3<double>(1, 2, 3));
     CHECK(scene.work.added_stiffness == std::vector<double>{0, 0, 1, 0, 0.5, 0, 0});
-    scene.work.begin_step();
+    scene.begin_step();
     CHECK(scene.work.constraint_force(1) == Vector3<double>(0, 0, 0));
     CHECK(scene.work.added_stiffness == std::vector<double>(7, 0));
 }
 
 TEST_CASE("seeds keep their order, and each comes once", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene);
+    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
     for (const Index v : {4, 0, 4, 2, 0}) context.seed(v);
     CHECK(as_vector(scene.work.seeds.items()) == std::vector<Index>{4, 0, 2});
 }
 
 TEST_CASE("each constraint finds the points it had in the step before, and no others", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene);
+    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
     const auto begin = [&](std::size_t constraint) {
         context.select_constraint(constraint);
         context.begin_points();
@@ -192,10 +166,10 @@ TEST_CASE("each constraint finds the points it had in the step before, and no ot
     CHECK(context.points().size() == 2);
     CHECK(context.points()[1].triangle == 8);
     CHECK(context.cached_point(7, 0, 0) == nullptr);  // they are of this step
-    CHECK_FALSE(scene.work.full);
+    CHECK(context.refusal() == StepStatus::advanced);
 
-    scene.work.end_step();
-    scene.work.begin_step();
+    scene.contacts.end_step();
+    scene.begin_step();
     begin(0);
     CHECK(context.points().empty());
     for (const int round : {1, 2}) {  // in any order, and again
@@ -214,35 +188,34 @@ TEST_CASE("each constraint finds the points it had in the step before, and no ot
     begin(2);
     CHECK(context.cached_point(7, 0, 0) == nullptr);
 
-    scene.work.end_step();  // a step without points
-    scene.work.begin_step();
+    scene.contacts.end_step();  // a step without points
+    scene.begin_step();
     begin(0);
     CHECK(context.cached_point(7, 0, 0) == nullptr);
 }
 
 TEST_CASE("points can be forgotten, and are refused beyond the capacity", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene);
+    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
     context.select_constraint(0);
     context.begin_points();
     for (Index f = 0; f < 3; ++f) context.add_point(point_of(f, 0));
-    CHECK_FALSE(scene.work.full);
+    CHECK(context.refusal() == StepStatus::advanced);
     context.add_point(point_of(3, 0));
-    CHECK(scene.work.full);
+    CHECK(context.refusal() == StepStatus::too_many_contact_points);
     CHECK(context.points().size() == 3);
-    scene.work.end_step();
-    scene.work.begin_step();
-    CHECK_FALSE(scene.work.full);
+    scene.contacts.end_step();
+    scene.begin_step();
     context.begin_points();
     CHECK(context.cached_point(1, 0, 0) != nullptr);
-    scene.work.reset_points();
+    scene.contacts.reset_points();
     CHECK(context.cached_point(1, 0, 0) == nullptr);
 }
 
 TEST_CASE("whether a vertex that is not loaded is pinned is the network's word", "[context]") {
     SixPoints scene;
     scene.pinned_vertex = 2;
-    const ConstraintContext<double> context(scene.x, scene.work, scene);
+    const ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
     CHECK(context.fixed(2));
     scene.pinned_vertex = 3;
     CHECK_FALSE(context.fixed(2));
@@ -252,24 +225,26 @@ TEST_CASE("whether a vertex that is not loaded is pinned is the network's word",
 TEST_CASE("a state is copied with all it holds", "[context]") {
     auto scene = std::make_unique<SixPoints>();
     {
-        ConstraintContext<double> context(scene->x, scene->work, *scene);
+        ConstraintContext<double> context(scene->x, scene->work, scene->contacts, *scene);
         context.select_constraint(0);
         context.begin_points();
         context.add_point(point_of(7, 0, 4));
-        scene->work.end_step();
+        scene->contacts.end_step();
     }
-    StepState<double> copy = scene->work;
+    VertexRows<double> copy = scene->work;
+    ContactState<double> contacts = scene->contacts;
     Points<double> points = scene->points;
     scene.reset();
     const ConstPointsRef<double> x(points);
     const SixPoints pins;
-    ConstraintContext<double> context(x, copy, pins);
+    ConstraintContext<double> context(x, copy, contacts, pins);
     copy.begin_step();
+    contacts.begin_step();
     context.select_constraint(0);
     context.begin_points();
     REQUIRE(context.cached_point(7, 0, 0) != nullptr);
     CHECK(context.cached_point(7, 0, 0)->force.z() == -4);
     for (Index f = 0; f < 3; ++f) context.add_point(point_of(f, 0));
-    CHECK_FALSE(copy.full);  // the capacity is copied too
+    CHECK(context.refusal() == StepStatus::advanced);  // the capacity is copied too
     CHECK(copy.vertex_count() == 6);
 }

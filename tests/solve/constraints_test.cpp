@@ -429,14 +429,16 @@ struct Told {
 }  // namespace
 
 TEST_CASE("a set of constraints is valid if all are, violated if any is, finite if all forces are") {
-    StepState<double> work(1, 8);
+    VertexRows<double> work(1);
+    ContactState<double> contacts(1, 8);
     const Points<double> positions = Points<double>::Zero(3, 1);
     const ConstPointsRef<double> x = positions;
     work.begin_step();
+    contacts.begin_step();
     const struct {
         bool pinned(Index) const { return false; }
     } none_pinned;
-    ConstraintContext<double> context(x, work, none_pinned);
+    ConstraintContext<double> context(x, work, contacts, none_pinned);
     Index begun = 0;
     std::array<Vector3<double>, 2> reactions{};
     const double nan = std::numeric_limits<double>::quiet_NaN();

@@ -24,20 +24,21 @@ struct NonePinned {
 template <class S>
 struct Patch {
     Patch(Random& random, Index triangles, const Tool<S>& with)
-        : tool(with), x(3, 3 * triangles), state(3 * triangles, 5 * triangles) {
+        : tool(with), x(3, 3 * triangles), rows(3 * triangles), contacts(3 * triangles, 5 * triangles) {
         for (Index f = 0; f < triangles; ++f) {
             const Vector3<S> centre = tool.position + random.number(S(0), S(1)) * tool.axis +
                                       random.number(S(0.5), S(1.5)) * tool.radius * random.unit_vector<S>();
             for (Index k = 0; k < 3; ++k) x.col(3 * f + k) = centre + random.vector(S(-0.5), S(0.5));
         }
         const ConstPointsRef<S> start = x;
-        state.begin_step();
+        rows.begin_step();
+        contacts.begin_step();
         for (Index v = 0; v < x.cols(); ++v) {
-            state.load(v, start, NonePinned{});
+            rows.load(v, start, NonePinned{});
             Symmetric3<S> block = diagonal3(random.number(S(0.1), S(1)));
             block += outer<S>(random.number(S(0), S(2)), random.unit_vector<S>());
-            state.set_response(v, {block, S(100), S(100)}, S(0.1));
-            state.forced.insert(v);
+            rows.set_response(v, {block, S(100), S(100)}, S(0.1));
+            rows.forced.insert(v);
         }
         for (Index f = 0; f < triangles; ++f) {
             for (int feature = 0; feature < feature_pairs(tool); ++feature) {
@@ -47,20 +48,21 @@ struct Patch {
                                   direction<S>(nearest->separation, Vector3<S>::UnitZ()), Vector3<S>::Zero()});
             }
         }
-        state.packs.append(std::span<const ContactPoint<S>>(points), 0, [](Index) { return false; });
+        contacts.packs.append(std::span<const ContactPoint<S>>(points), 0, [](Index) { return false; });
     }
     [[nodiscard]] std::array<Index, 3> corners(Index f) const { return {3 * f, 3 * f + 1, 3 * f + 2}; }
-    [[nodiscard]] Triangle<S> triangle(Index f) const { return triangle_at(state.positions(), corners(f)); }
+    [[nodiscard]] Triangle<S> triangle(Index f) const { return triangle_at(rows.positions(), corners(f)); }
     [[nodiscard]] ContactTool<S> shape() const { return {tool.position, tool.axis, tool.position, tool.radius}; }
     [[nodiscard]] std::vector<ContactPoint<S>> unpacked() const {
         auto found = points;
-        state.packs.unpack(found);
+        contacts.packs.unpack(found);
         return found;
     }
 
     Tool<S> tool;
     Points<S> x;
-    StepState<S> state;
+    VertexRows<S> rows;
+    ContactState<S> contacts;
     std::vector<ContactPoint<S>> points;
 };
 
@@ -75,9 +77,9 @@ Tool<S> random_tool(Random& random, bool is_capsule) {
 /// another.
 template <class S, class Act>
 void for_each_located(Patch<S>& patch, Act act) {
-    for (auto& pack : patch.state.packs.items()) {
+    for (auto& pack : patch.contacts.packs.items()) {
         pack.load.force = S(1);
-        detail::locate(patch.shape(), detail::corners_of(patch.state, pack), pack);
+        detail::locate(patch.shape(), detail::corners_of(patch.rows, pack), pack);
         for (std::size_t i = 0; i < pack.size; ++i) {
             const auto& point = patch.points[static_cast<std::size_t>(pack.point[i])];
             act(pack, i, point, closest_points(patch.triangle(point.triangle), patch.tool, point.feature));
@@ -139,9 +141,9 @@ TEMPLATE_TEST_CASE("on a triangle too thin for its normal to be known a point is
         const S thickness = std::pow(std::numeric_limits<S>::epsilon(), random.number(S(0.65), S(0.95)));
         const S apex = random.number(S(0.2), S(0.8)), distance = random.number(S(0), S(10)) * thickness;
         const S slack = thickness + 64 * std::numeric_limits<S>::epsilon();
-        patch.state.set_position(0, a);
-        patch.state.set_position(1, a + along);
-        patch.state.set_position(2, a + apex * along + thickness * aside);
+        patch.rows.set_position(0, a);
+        patch.rows.set_position(1, a + along);
+        patch.rows.set_position(2, a + apex * along + thickness * aside);
         const Vector3<S> over = Vector3<S>::Constant(S(0.2)) + S(0.4) * random.barycentric<S>();
         patch.tool.position = point_at(patch.triangle(0), over) + distance * cross(along, aside);
         for_each_located(patch, [&](const auto& pack, std::size_t i, const auto& point, const auto&) {
@@ -162,7 +164,8 @@ TEMPLATE_TEST_CASE("forces that act add the stiffness of rocking faces, and take
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         Patch<S> patch(random, 1 + random.index(9), random_tool<S>(random, seed % 2 == 0));
-        auto& state = patch.state;
+        auto& rows = patch.rows;
+        auto& contacts = patch.contacts;
         std::vector<S> expected(static_cast<std::size_t>(patch.x.cols()), 0);
         for_each_located(patch, [&](const auto&, std::size_t, const auto& point, const auto& nearest) {
             if (!nearest) return;
@@ -172,16 +175,16 @@ TEMPLATE_TEST_CASE("forces that act add the stiffness of rocking faces, and take
                 expected[static_cast<std::size_t>(point.corners[k])] += stiffness[static_cast<Eigen::Index>(k)];
             }
         });
-        apply_forces(state, state.packs.items());
+        apply_forces(rows, contacts, contacts.packs.items());
         for (Index v = 0; v < patch.x.cols(); ++v) {
             const S exact = expected[static_cast<std::size_t>(v)];
-            REQUIRE(std::abs(state.row(state.force, v).extra() - exact) <= 100 * slack * (1 + exact));
+            REQUIRE(std::abs(rows.row(rows.force, v).extra() - exact) <= 100 * slack * (1 + exact));
         }
-        for (auto& pack : state.packs.items()) pack.load.force = S(0);
-        apply_forces(state, state.packs.items());
+        for (auto& pack : contacts.packs.items()) pack.load.force = S(0);
+        apply_forces(rows, contacts, contacts.packs.items());
         for (Index v = 0; v < patch.x.cols(); ++v) {
-            REQUIRE(norm(state.constraint_force(v)) <= slack);
-            REQUIRE(std::abs(state.row(state.force, v).extra()) <=
+            REQUIRE(norm(rows.constraint_force(v)) <= slack);
+            REQUIRE(std::abs(rows.row(rows.force, v).extra()) <=
                     100 * slack * (1 + expected[static_cast<std::size_t>(v)]));
         }
     }
@@ -196,9 +199,10 @@ TEMPLATE_TEST_CASE("solved contacts push, never pull, and their corners move by 
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         Patch<S> patch(random, 1 + random.index(9), random_tool<S>(random, false));
-        auto& state = patch.state;
-        for (int pass = 0; pass < 200; ++pass) solve_contacts(state, patch.shape(), state.packs.items());
-        apply_forces(state, state.packs.items());
+        auto& rows = patch.rows;
+        auto& contacts = patch.contacts;
+        for (int pass = 0; pass < 200; ++pass) solve_contacts(rows, contacts, patch.shape(), contacts.packs.items());
+        apply_forces(rows, contacts, contacts.packs.items());
         for (const auto& point : patch.unpacked()) {
             const S force = -dot(point.force, point.normal);
             const S gap =
@@ -211,7 +215,7 @@ TEMPLATE_TEST_CASE("solved contacts push, never pull, and their corners move by 
             ++touching;
             for (std::size_t k = 0; k < 3; ++k) {
                 const Vector3<S> share = point.weights[static_cast<Eigen::Index>(k)] * point.force;
-                const Vector3<S> row = state.constraint_force(point.corners[k]);
+                const Vector3<S> row = rows.constraint_force(point.corners[k]);
                 REQUIRE(norm<S>(row - share) <= slack);
             }
         }
@@ -226,8 +230,9 @@ TEMPLATE_TEST_CASE("one pass closes the gap as far as the compliance of the corn
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         Patch<S> patch(random, 1 + random.index(9), random_tool<S>(random, false));
-        auto& state = patch.state;
-        const auto pass = solve_contacts(state, patch.shape(), state.packs.items());
+        auto& rows = patch.rows;
+        auto& contacts = patch.contacts;
+        const auto pass = solve_contacts(rows, contacts, patch.shape(), contacts.packs.items());
         REQUIRE_FALSE(pass.released);
         S largest = 0;
         for (const auto& point : patch.unpacked()) {
@@ -237,9 +242,9 @@ TEMPLATE_TEST_CASE("one pass closes the gap as far as the compliance of the corn
             for (std::size_t k = 0; k < 3; ++k) {
                 const Index v = point.corners[k];
                 const S weight = point.weights[static_cast<Eigen::Index>(k)];
-                const Vector3<S> by = state.response_of(v).compliance * Vector3<S>(weight * point.force);
-                compliance += weight * weight * dot<S>(point.normal, state.response_of(v).compliance * point.normal);
-                const Vector3<S> moved = membrane::point(state.positions(), v) - membrane::point(patch.x, v);
+                const Vector3<S> by = rows.response_of(v).compliance * Vector3<S>(weight * point.force);
+                compliance += weight * weight * dot<S>(point.normal, rows.response_of(v).compliance * point.normal);
+                const Vector3<S> moved = membrane::point(rows.positions(), v) - membrane::point(patch.x, v);
                 REQUIRE(norm<S>(moved - by) <= slack * (1 + force));
             }
             const auto before = triangle_at(patch.x, point.corners);
@@ -254,9 +259,10 @@ TEMPLATE_TEST_CASE("a point that presses far harder than what resists at it is l
     using S = TestType;
     Random random(1);
     Patch<S> patch(random, 4, random_tool<S>(random, false));
-    auto& state = patch.state;
-    for (Index v = 0; v < patch.x.cols(); ++v) state.set_response(v, {state.response_of(v).compliance, 0, 0}, S(0.1));
-    const auto pass = solve_contacts(state, patch.shape(), state.packs.items());
+    auto& rows = patch.rows;
+    auto& contacts = patch.contacts;
+    for (Index v = 0; v < patch.x.cols(); ++v) rows.set_response(v, {rows.response_of(v).compliance, 0, 0}, S(0.1));
+    const auto pass = solve_contacts(rows, contacts, patch.shape(), contacts.packs.items());
     CHECK(pass.released);
     CHECK(pass.largest == 0);
     for (const auto& point : patch.unpacked()) CHECK(point.force.isZero(0));
@@ -271,7 +277,7 @@ TEMPLATE_TEST_CASE("what is pushed out is outside, and moves along the normals",
         Patch<S> patch(random, 1 + random.index(9), random_tool<S>(random, false));
         bool moves = true;
         for (int pass = 0; pass < 1000 && moves; ++pass)
-            moves = push_out(patch.state, patch.shape(), patch.state.packs.items());
+            moves = push_out(patch.rows, patch.contacts, patch.shape(), patch.contacts.packs.items());
         for (const auto& point : patch.points) {
             const auto now = patch.triangle(point.triangle), before = triangle_at(patch.x, point.corners);
             const bool was_inside = norm(closest_points(before, patch.tool, 0)->separation) < patch.tool.radius - slack;
@@ -294,12 +300,12 @@ TEMPLATE_TEST_CASE("beside a fixed corner that has no stiffness yet the free one
         Patch<S> free = patch;
         auto& point = patch.points.front();
         point.on_fixed = true;
-        patch.state.packs.clear();
-        patch.state.packs.append(std::span<const ContactPoint<S>>(patch.points), 0, [](Index v) { return v == 0; });
-        REQUIRE(push_out<S>(patch.state, patch.shape(), patch.state.packs.items()) ==
-                push_out<S>(free.state, free.shape(), free.state.packs.items()));
-        REQUIRE(patch.state.position_of(0) == Vector3<S>(patch.x.col(0)));
-        for (const Index v : {1, 2}) REQUIRE(patch.state.position_of(v) == free.state.position_of(v));
+        patch.contacts.packs.clear();
+        patch.contacts.packs.append(std::span<const ContactPoint<S>>(patch.points), 0, [](Index v) { return v == 0; });
+        REQUIRE(push_out<S>(patch.rows, patch.contacts, patch.shape(), patch.contacts.packs.items()) ==
+                push_out<S>(free.rows, free.contacts, free.shape(), free.contacts.packs.items()));
+        REQUIRE(patch.rows.position_of(0) == Vector3<S>(patch.x.col(0)));
+        for (const Index v : {1, 2}) REQUIRE(patch.rows.position_of(v) == free.rows.position_of(v));
     }
 }
 
@@ -307,17 +313,17 @@ TEST_CASE("the largest move is that of the vertex that has moved farthest from w
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
-        StepState<double> state(20, 0);
-        std::vector<Index> vertices;
+        VertexRows<double> rows(20);
+        ContactState<double> contacts(20, 0);
         double expected = 0;
         for (Index v = 0; v < 20; ++v) {
             const Vector3<double> kept = random.vector(), now = random.vector();
-            state.row(state.anchor, v).set(kept);
-            state.set_position(v, now);
+            contacts.keep(v, kept);
+            rows.set_position(v, now);
             if (!random.chance(0.5)) continue;
-            vertices.push_back(v);
+            contacts.candidates.insert(v);
             expected = std::max(expected, squared_norm<double>(now - kept));
         }
-        CHECK(largest_squared_move<double>(state, vertices) == expected);
+        CHECK(largest_squared_move(rows, contacts) == expected);
     }
 }

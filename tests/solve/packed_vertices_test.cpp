@@ -144,31 +144,31 @@ void check_alone(const Law& law, const Rule& rule) {
         packed.assign(queue.vertices(), queue.colour_ends(), network);
         const Points<S> start_points = membrane.mesh.positions();
         const ConstPointsRef<S> start = start_points;
-        StepState<S> state(vertices, 0);
-        state.begin_step();
-        state.force_tolerance = random.chance(0.5) ? S(0) : S(0.1);
+        VertexRows<S> rows(vertices);
+        rows.begin_step();
+        rows.force_tolerance = random.chance(0.5) ? S(0) : S(0.1);
         for (Index v = 0; v < vertices; ++v) {
-            state.load(v, start, network);
-            state.set_position(v, point(start, v) + random.vector(S(-0.1), S(0.1)));
-            if (random.chance(0.3)) state.row(state.force, v).set(random.vector<S>(), random.number(S(0), S(2)));
+            rows.load(v, start, network);
+            rows.set_position(v, point(start, v) + random.vector(S(-0.1), S(0.1)));
+            if (random.chance(0.3)) rows.row(rows.force, v).set(random.vector<S>(), random.number(S(0), S(2)));
         }
         const bool in_contact = random.chance(0.5);
-        for (const Index v : in_contact ? queue.vertices() : std::span<const Index>()) state.seeds.insert(v);
-        StepState<S> other = state;
+        for (const Index v : in_contact ? queue.vertices() : std::span<const Index>()) rows.seeds.insert(v);
+        VertexRows<S> other = rows;
         const auto scene_of = [&](auto& of, const auto& now) {
             return StepInput<S, std::remove_cvref_t<decltype(network)>, VirtualVolumeSprings<S>>{
                 start, now, S(1e-3), network, membrane.foundation, of};
         };
-        const ConstPointsRef<S> now = state.positions(), alone_now = other.positions();
-        const auto scene = scene_of(state, now), alone = scene_of(other, alone_now);
+        const ConstPointsRef<S> now = rows.positions(), alone_now = other.positions();
+        const auto scene = scene_of(rows, now), alone = scene_of(other, alone_now);
         packed.begin_step(scene);
         for (std::size_t p = 0, end = 0; p < packed.count(); p = end) {
             end = packed.end_of_group(p, packed.count());
             in_contact ? packed.template update<true>(p, end, scene, rule, false, OneThread())
                        : packed.template update<false>(p, end, scene, rule, true, OneThread());
         }
-        for (const Index v : queue.vertices()) moved += test::update(alone, v, rule, state.force_tolerance);
-        for (Index v = 0; v < vertices; ++v) REQUIRE(state.position_of(v) == other.position_of(v));
+        for (const Index v : queue.vertices()) moved += test::update(alone, v, rule, rows.force_tolerance);
+        for (Index v = 0; v < vertices; ++v) REQUIRE(rows.position_of(v) == other.position_of(v));
     }
     CHECK(moved > cases(60));
 }
@@ -531,26 +531,26 @@ TEMPLATE_TEST_CASE("the residual forces of packs are those of their vertices, to
         packed.assign(queue.vertices(), queue.colour_ends(), membrane.network);
         const Points<S> start_points = membrane.mesh.positions();
         const ConstPointsRef<S> start = start_points;
-        StepState<S> state(vertices, 0);
-        state.begin_step();
+        VertexRows<S> rows(vertices);
+        rows.begin_step();
         for (Index v = 0; v < vertices; ++v) {
-            state.load(v, start, membrane.network);
-            state.set_position(v, point(start, v) + random.vector(S(-0.1), S(0.1)));
+            rows.load(v, start, membrane.network);
+            rows.set_position(v, point(start, v) + random.vector(S(-0.1), S(0.1)));
         }
         if (!queue.vertices().empty()) {
             const Index v = queue.vertices()[0];
-            state.row(state.force, v).set(random.vector<S>(), S(0));
+            rows.row(rows.force, v).set(random.vector<S>(), S(0));
         }
-        const ConstPointsRef<S> now = state.positions();
+        const ConstPointsRef<S> now = rows.positions();
         const StepInput<S, decltype(membrane.network), decltype(membrane.foundation)> scene{
-            start, now, S(1e-3), membrane.network, membrane.foundation, state};
+            start, now, S(1e-3), membrane.network, membrane.foundation, rows};
         packed.begin_step(scene);
         for (std::size_t p = 0; p < packed.count(); ++p) {
             packed.evaluate_residual(p, scene);
             for (const Index v : packed.vertices(p)) {
                 const Vector3<S> force = total_force(scene, v).force;
-                REQUIRE(state.residual_force(v) == force);
-                REQUIRE(state.unbalanced_force(v) == norm(undamped_force(scene, v, force)));
+                REQUIRE(rows.residual_force(v) == force);
+                REQUIRE(rows.unbalanced_force(v) == norm(undamped_force(scene, v, force)));
             }
         }
     }

@@ -679,7 +679,8 @@ struct TwoTriangles {
         contact.detection_distance = 1.2;
         contact.radius = 1;
         contact.triangles = contact.candidates = triangles;
-        state.begin_step();
+        rows.begin_step();
+        contacts.begin_step();
         context.begin_points();
     }
 
@@ -691,8 +692,9 @@ struct TwoTriangles {
     Points<double> x = Points<double>::Zero(3, 6);
     ConstPointsRef<double> start = x;
     std::array<ContactTriangle, 2> triangles{{{0, {0, 1, 2}}, {1, {3, 4, 5}}}};
-    StepState<double> state{6, 20};
-    ConstraintContext<double> context{start, state, *this};
+    VertexRows<double> rows{6};
+    ContactState<double> contacts{6, 20};
+    ConstraintContext<double> context{start, rows, contacts, *this};
     ToolContact<double> pressing;
 };
 

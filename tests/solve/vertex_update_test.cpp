@@ -31,28 +31,28 @@ struct MidStep {
         : random(seed),
           network(mesh, law, {.stiffness = 3.0, .mass = 0.5}),
           foundation(mesh, {.stiffness = 2.0, .damping = 0.3}),
-          state(42, 4),
+          rows(42),
           start(test::jittered(mesh.positions(), 0.1, random)),
           x(test::jittered(start, 0.05, random)),
           v(random.index(42)) {
-        state.begin_step();
+        rows.begin_step();
         for (Index w = 0; w < 42; ++w) {
-            state.load(w, start_ref, network);
-            state.set_position(w, point(x, w));
+            rows.load(w, start_ref, network);
+            rows.set_position(w, point(x, w));
         }
-        state.row(state.force, v).set(force, 7);
+        rows.row(rows.force, v).set(force, 7);
     }
     Random random;
     TriangleMesh<double> mesh = icosphere({.radius = 1, .subdivisions = 1});
     MassSpringNetwork<double, Law> network;
     VirtualVolumeSprings<double> foundation;
-    StepState<double> state;
+    VertexRows<double> rows;
     Points<double> start, x;
-    ConstPointsRef<double> start_ref{start}, now_ref{state.positions()};
+    ConstPointsRef<double> start_ref{start}, now_ref{rows.positions()};
     Index v;
     Vector3<double> force = random.vector();
     StepInput<double, MassSpringNetwork<double, Law>, VirtualVolumeSprings<double>> scene{start_ref, now_ref,    0.1,
-                                                                                          network,   foundation, state};
+                                                                                          network,   foundation, rows};
 };
 
 /// Moves a vertex by a given length, with or without descent.
@@ -75,8 +75,8 @@ Vector3<double> displacement_by(Step& step, const Rule& rule) {
     packed.assign({&step.v, 1}, end, step.network);
     packed.begin_step(step.scene);
     packed.template update<false>(0, 1, step.scene, rule, true, OneThread());
-    const Vector3<double> by = step.state.position_of(step.v) - point(step.x, step.v);
-    step.state.set_position(step.v, point(step.x, step.v));
+    const Vector3<double> by = step.rows.position_of(step.v) - point(step.x, step.v);
+    step.rows.set_position(step.v, point(step.x, step.v));
     return by;
 }
 

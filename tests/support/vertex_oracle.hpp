@@ -30,10 +30,10 @@ auto state_of(const Scene& scene, membrane::Index v) {
     state.stiffness += others.stiffness;
     state.mass = scene.network.has_masses() ? scene.network.mass(v) : Scalar(0);
     state.dt = scene.dt;
-    state.constrained = scene.state.seeds.contains(v);
+    state.constrained = scene.rows.seeds.contains(v);
     if (state.constrained) {
-        state.contact_stiffness = scene.state.contact_stiffness(v);
-        state.contact_normal = membrane::direction_or_zero(scene.state.constraint_force(v));
+        state.contact_stiffness = scene.rows.contact_stiffness(v);
+        state.contact_normal = membrane::direction_or_zero(scene.rows.constraint_force(v));
     }
     return state;
 }
@@ -43,7 +43,7 @@ auto state_of(const Scene& scene, membrane::Index v) {
 template <class Rule, class Scene, class Scalar>
 bool update(const Scene& scene, membrane::Index v, const Rule& rule, Scalar tolerance) {
     const auto state = state_of<Rule>(scene, v);
-    if (scene.state.is_fixed(v) || !(norm(state.force) > tolerance)) return false;
+    if (scene.rows.is_fixed(v) || !(norm(state.force) > tolerance)) return false;
     membrane::Vector3<Scalar> by = rule.compliance(state) * state.force;
     const auto others = membrane::non_network_force(scene, v);
     const auto rises = [&] {
@@ -59,7 +59,7 @@ bool update(const Scene& scene, membrane::Index v, const Rule& rule, Scalar tole
         while (halvings >= 0 && halvings < std::numeric_limits<Scalar>::digits && rises()) by /= 2, ++halvings;
         if (halvings == std::numeric_limits<Scalar>::digits) by = membrane::Vector3<Scalar>::Zero();
     }
-    scene.state.set_position(v, point(scene.x, v) + by);
+    scene.rows.set_position(v, point(scene.x, v) + by);
     return true;
 }
 

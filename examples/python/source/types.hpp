@@ -213,7 +213,7 @@ template <>
 inline constexpr bool is_in_loop<Tear> = true;
 ///@}
 
-inline constexpr std::size_t max_constraints = membrane::StepState<double>::max_constraints;
+inline constexpr std::size_t max_constraints = membrane::max_constraints;
 
 /// A constraint or none, for functions that take their constraints one by one: there are always `max_constraints`.
 class Described : public membrane::ConstraintRef<double> {

@@ -80,7 +80,6 @@ class ErrorBound {
                                       const Volume& volume, const Constraints&... constraints);
 
   private:
-    static constexpr std::size_t max_constraints = StepState<double>::max_constraints;
     static constexpr int max_attempts = 4;
 
     void begin(std::size_t constraint_count) noexcept;

@@ -171,26 +171,26 @@ class ConstraintList {
             context_.begin_points();
             constraint.begin(context_);
         });
-        context_.state().find_shared();
+        context_.contacts().find_shared();
     }
     /// Enforces all constraints, in several rounds if they may oppose one another; returns whether one was violated.
     [[nodiscard]] bool enforce() const noexcept {
         constexpr int max_rounds = 8;
-        const int rounds = context_.state().several_on_fixed ? max_rounds : 1;
+        const int rounds = context_.contacts().several_on_fixed ? max_rounds : 1;
         bool changed = false;
         bool again = true;
         for (int i = 0; again && i < rounds; ++i) {
             again = false;
             for_each([&](const auto& constraint, std::size_t) { again |= constraint.enforce(context_); });
-            context_.limit_motion(context_.state().shared.items());
+            limit_motion<Scalar>(context_, context_.contacts().shared.items());
             changed |= again;
         }
         return changed;
     }
     /// Computes the reactions; returns false if one is not finite. Updates the contact points from their packs.
     [[nodiscard]] bool react(std::span<Vector3<Scalar>> reactions) const noexcept {
-        auto& state = context_.state();
-        state.packs.unpack(state.points.items());
+        auto& contacts = context_.contacts();
+        contacts.packs.unpack(contacts.points.items());
         bool finite = true;
         for_each([&](const auto& constraint, std::size_t i) {
             reactions[i] = constraint.reaction(context_);
@@ -201,7 +201,7 @@ class ConstraintList {
     /// Finds the largest violation, after `react`.
     void find_violation(StepReport<Scalar>& report) const noexcept {
         for_each([&](const auto&, std::size_t i) {
-            if (context_.state().several_on_fixed) context_.sum_support_forces();
+            if (context_.contacts().several_on_fixed) sum_support_forces(context_);
             for (const auto& point : std::as_const(context_).points()) {
                 if (!point.on_fixed) continue;
                 const Scalar violation = (std::max)(norm(support_displacement(context_, point)),
@@ -378,8 +378,8 @@ void PointAttachment<Scalar>::begin(ConstraintContext<Scalar>& context) const no
     add_point_force(context, corners, barycentric, point.force);
     context.add_point(point);
     if (size >= max_force) return;  // it slips: the target is not where the point will be
-    context.allow_motion(norm<Scalar>(target - point_at(triangle_of(context, corners), barycentric)));
-    context.sum_support_forces(context.constraint() + 1);
+    allow_motion(context, norm<Scalar>(target - point_at(triangle_of(context, corners), barycentric)));
+    sum_support_forces(context, context.constraint() + 1);
     press_in<Scalar>(context, corners, barycentric, offset(context, point));
 }
 
@@ -387,7 +387,7 @@ template <Real Scalar>
 bool PointAttachment<Scalar>::enforce(ConstraintContext<Scalar>& context) const noexcept {
     bool changed = false;
     for (auto& point : context.points()) {
-        if (point.on_fixed) context.sum_support_forces();
+        if (point.on_fixed) sum_support_forces(context);
         const Vector3<Scalar> by = offset(context, point);
         if (!(norm(by) > negligible_distance(context, point))) continue;
         Vector3<Scalar> more = force_for<Scalar>(context, point, by);

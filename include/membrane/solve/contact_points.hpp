@@ -11,15 +11,15 @@
 
 #include <membrane/contact/contact.hpp>
 #include <membrane/contact/tool.hpp>
-#include <membrane/solve/contact_pack.hpp>
-#include <membrane/solve/step_state.hpp>
+#include <membrane/solve/contact_state.hpp>
+#include <membrane/solve/vertex_rows.hpp>
 #include <membrane/surface/triangle.hpp>
 
 /// Contact points against a tool, several at a time: their positions, penetrations and contact forces.
 ///
-///     membrane::push_out(state, tool, packs);                      // moves the surface out of the tool
-///     membrane::solve_contacts(state, tool, packs);                // projected Gauss-Seidel, one pass
-///     membrane::apply_forces(state, packs);
+///     membrane::push_out(rows, contacts, tool, packs);             // moves the surface out of the tool
+///     membrane::solve_contacts(rows, contacts, tool, packs);       // projected Gauss-Seidel, one pass
+///     membrane::apply_forces(rows, contacts, packs);
 namespace membrane {
 
 /// The tool in contact.
@@ -48,23 +48,27 @@ inline constexpr double deep_overlap = 0.005;
 /// One pass: locates each point at the current positions, and moves the free corners of a penetrating point until it is
 /// outside the tool. Returns whether a point moved. Online. Cost: linear in the points.
 template <Real Scalar>
-bool push_out(StepState<Scalar>& state, const ContactTool<Scalar>& tool, std::span<ContactPack<Scalar>> packs) noexcept;
+bool push_out(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts, const ContactTool<Scalar>& tool,
+              std::span<ContactPack<Scalar>> packs) noexcept;
 
 /// One pass of projected Gauss-Seidel: locates each point at the current positions, changes its force by the gap over
 /// the compliance of its corners, never below zero, and moves the corners by their response. If `again`, without vertex
 /// updates since the last pass, skips packs whose points neither pressed nor penetrated. Online. Cost: linear in the
 /// points.
 template <Real Scalar>
-ContactPass<Scalar> solve_contacts(StepState<Scalar>& state, const ContactTool<Scalar>& tool,
-                                   std::span<ContactPack<Scalar>> packs, bool again = false) noexcept;
+ContactPass<Scalar> solve_contacts(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
+                                   const ContactTool<Scalar>& tool, std::span<ContactPack<Scalar>> packs,
+                                   bool again = false) noexcept;
 
 /// Applies the forces found by these passes to the vertices.
 template <Real Scalar>
-void apply_forces(StepState<Scalar>& state, std::span<ContactPack<Scalar>> packs) noexcept;
+void apply_forces(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
+                  std::span<ContactPack<Scalar>> packs) noexcept;
 
-/// The largest squared distance of one of these vertices from its `anchor` [m^2]. @pre they are kept
+/// The largest squared distance of a candidate from its kept position [m^2].
 template <Real Scalar>
-[[nodiscard]] Scalar largest_squared_move(const StepState<Scalar>& state, std::span<const Index> vertices) noexcept;
+[[nodiscard]] Scalar largest_squared_move(const VertexRows<Scalar>& rows,
+                                          const ContactState<Scalar>& contacts) noexcept;
 
 namespace detail {
 
@@ -209,27 +213,28 @@ inline constexpr int corners_at_once = 2;
 /// stiffness: along the total force on a corner; beside fixed or shared corners in all directions. There a point may
 /// press hard with little weight on its free corners, and other points set the direction of the total force on them.
 template <Real Scalar>
-MEMBRANE_INLINE void add_forces(StepState<Scalar>& state, ContactPack<Scalar>& pack) noexcept {
+MEMBRANE_INLINE void add_forces(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
+                                ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     const auto &load = pack.load, &applied = pack.applied;
     each_corner([&](std::size_t k) {
         const auto i = static_cast<Eigen::Index>(k);
-        auto row = gather_padded(state.force.data(), pack.corner[k].data());
+        auto row = gather_padded(rows.force.data(), pack.corner[k].data());
         const Wide now = load.force * load.weights[i], before = applied.force * applied.weights[i];
         const Vector3<Wide> change = before * applied.normal - now * load.normal;
         Wide& contact_stiffness = row.extra;
         row.point += change;
         const Wide stiffer = load.stiffness[i] - applied.stiffness[i];
         if (!pack.on_fixed) contact_stiffness += stiffer;
-        scatter_padded(row, state.force.data(), pack.corner[k].data());
+        scatter_padded(row, rows.force.data(), pack.corner[k].data());
         if (!pack.on_fixed) return;
         for (std::size_t lane = 0; lane < Wide::count; ++lane) {
             const auto v = static_cast<std::size_t>(row_at(pack.corner[k][lane]));
-            state.added_stiffness[v] += corners_at_once * stiffer[lane];
+            rows.added_stiffness[v] += corners_at_once * stiffer[lane];
         }
-        auto support = gather_padded(state.support.data(), pack.corner[k].data());
+        auto support = gather_padded(contacts.support.data(), pack.corner[k].data());
         support.point += change;
-        scatter_padded(support, state.support.data(), pack.corner[k].data());
+        scatter_padded(support, contacts.support.data(), pack.corner[k].data());
     });
     pack.applied = load;
 }
@@ -243,14 +248,14 @@ struct SupportOfPack {
 };
 
 template <Real Scalar>
-[[nodiscard]] SupportOfPack<Scalar> support_of(const StepState<Scalar>& state,
+[[nodiscard]] SupportOfPack<Scalar> support_of(const ContactState<Scalar>& contacts,
                                                const ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     SupportOfPack<Scalar> sum;
     for (std::size_t k = 0; pack.on_fixed && k < 3; ++k) {
         const auto i = static_cast<Eigen::Index>(k);
-        const auto support = gather_padded(state.support.data(), pack.corner[k].data());
-        const auto others = gather_padded(state.opposing.data(), pack.corner[k].data());
+        const auto support = gather_padded(contacts.support.data(), pack.corner[k].data());
+        const auto others = gather_padded(contacts.opposing.data(), pack.corner[k].data());
         const Wide &weight = pack.load.weights[i], &stiffness = support.extra;
         const auto is_fixed = pack.free[i] < 1;
         const Wide pressed = -dot(support.point, pack.load.normal);
@@ -277,7 +282,7 @@ template <Real Scalar>
 
 /// A negligible gap: the response to a negligible force, or a few roundings [m].
 template <Real Scalar>
-[[nodiscard]] MEMBRANE_INLINE Lanes<Scalar> gap_tolerance(const StepState<Scalar>& state,
+[[nodiscard]] MEMBRANE_INLINE Lanes<Scalar> gap_tolerance(const VertexRows<Scalar>& rows,
                                                           const std::array<PaddedLanes<Scalar>, 3>& corner,
                                                           const ContactPack<Scalar>& pack,
                                                           const SupportOfPack<Scalar>& support) noexcept {
@@ -289,16 +294,16 @@ template <Real Scalar>
         sum += weight * weight * compliance;
     }
     const Wide rounding = 2 * std::numeric_limits<Scalar>::epsilon() * largest_magnitude<Wide>(corner[0].point);
-    const Wide tolerance = state.force_tolerance;
+    const Wide tolerance = rows.force_tolerance;
     return larger<Wide>(tolerance * sum, rounding) + tolerance * support.compliance;
 }
 
 template <Real Scalar>
-[[nodiscard]] MEMBRANE_INLINE std::array<PaddedLanes<Scalar>, 3> corners_of(const StepState<Scalar>& state,
+[[nodiscard]] MEMBRANE_INLINE std::array<PaddedLanes<Scalar>, 3> corners_of(const VertexRows<Scalar>& rows,
                                                                             const ContactPack<Scalar>& pack) noexcept {
-    return {gather_padded(state.position.data(), pack.corner[0].data()),
-            gather_padded(state.position.data(), pack.corner[1].data()),
-            gather_padded(state.position.data(), pack.corner[2].data())};
+    return {gather_padded(rows.position.data(), pack.corner[0].data()),
+            gather_padded(rows.position.data(), pack.corner[1].data()),
+            gather_padded(rows.position.data(), pack.corner[2].data())};
 }
 
 /// Response of the corners of a pack to a unit force along the normal, and the internal force and stiffness there.
@@ -311,7 +316,7 @@ struct PackResponse {
 };
 
 template <Real Scalar>
-[[nodiscard]] MEMBRANE_INLINE PackResponse<Scalar> response_of(const StepState<Scalar>& state,
+[[nodiscard]] MEMBRANE_INLINE PackResponse<Scalar> response_of(const VertexRows<Scalar>& rows,
                                                                const SupportOfPack<Scalar>& support,
                                                                const ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
@@ -320,14 +325,14 @@ template <Real Scalar>
     response.balanced_force = support.force;
     response.internal_stiffness = support.stiffness;
     each_corner([&](std::size_t k) {
-        const auto corner = state.responses(pack.corner[k]);
+        const auto corner = rows.responses(pack.corner[k]);
         const Wide& weight = pack.load.weights[static_cast<Eigen::Index>(k)];
         response.of_corner[k] = weight * (corner.compliance * pack.load.normal);
         response.compliance += weight * dot(response.of_corner[k], pack.load.normal);
         response.balanced_force += corner.internal_force;
-        if (state.has_external_forces) {
+        if (rows.has_external_forces) {
             response.balanced_force += Wide::of([&](std::size_t i) {
-                return state.external_force[static_cast<std::size_t>(row_at(pack.corner[k][i]))];
+                return rows.external_force[static_cast<std::size_t>(row_at(pack.corner[k][i]))];
             });
         }
         response.internal_stiffness += corner.internal_stiffness;
@@ -338,7 +343,7 @@ template <Real Scalar>
 /// Changes the force of each acting point by its gap over its compliance, never below zero, and moves the corners by
 /// their response. Returns the absolute change [N].
 template <Real Scalar>
-MEMBRANE_INLINE Lanes<Scalar> solve(StepState<Scalar>& state, const typename Lanes<Scalar>::Mask& acts,
+MEMBRANE_INLINE Lanes<Scalar> solve(VertexRows<Scalar>& rows, const typename Lanes<Scalar>::Mask& acts,
                                     const Lanes<Scalar>& gap, const Lanes<Scalar>& tolerance,
                                     const PackResponse<Scalar>& response, std::array<PaddedLanes<Scalar>, 3>& corner,
                                     ContactPack<Scalar>& pack, ContactPass<Scalar>& pass) noexcept {
@@ -364,7 +369,7 @@ MEMBRANE_INLINE Lanes<Scalar> solve(StepState<Scalar>& state, const typename Lan
     const Wide linear = select<Wide>(too_hard, 0, change);
     each_corner([&](std::size_t k) {
         corner[k].point -= linear * response.of_corner[k];
-        scatter_padded(corner[k], state.position.data(), pack.corner[k].data());
+        scatter_padded(corner[k], rows.position.data(), pack.corner[k].data());
     });
     return abs(change);
 }
@@ -379,41 +384,42 @@ template <Real Scalar>
 }  // namespace detail
 
 template <Real Scalar>
-MEMBRANE_FLATTEN bool push_out(StepState<Scalar>& state, const ContactTool<Scalar>& tool,
-                               std::span<ContactPack<Scalar>> packs) noexcept {
+MEMBRANE_FLATTEN bool push_out(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
+                               const ContactTool<Scalar>& tool, std::span<ContactPack<Scalar>> packs) noexcept {
     using Wide = Lanes<Scalar>;
     bool moved = false;
     for (auto& pack : packs) {
-        auto corner = detail::corners_of(state, pack);
+        auto corner = detail::corners_of(rows, pack);
         detail::locate(tool, corner, pack);
-        if (pack.on_fixed) detail::add_forces(state, pack);  // fixed corners respond to the forces so far
-        const auto support = detail::support_of(state, pack);
+        if (pack.on_fixed) detail::add_forces(rows, contacts, pack);  // fixed corners respond to the forces so far
+        const auto support = detail::support_of(contacts, pack);
         const Wide gap = detail::gap_of(tool, pack, support);
-        const auto inside = (pack.used > 0) & (-gap > detail::gap_tolerance(state, corner, pack, support));
+        const auto inside = (pack.used > 0) & (-gap > detail::gap_tolerance(rows, corner, pack, support));
         if (!any(inside)) continue;
         moved = true;
         const Wide part = select<Wide>(inside, gap / squared_norm(pack.load.weights), 0);
         for (std::size_t k = 0; k < 3; ++k) {
             const auto i = static_cast<Eigen::Index>(k);
             corner[k].point += (part * pack.load.weights[i] * pack.free[i]) * pack.load.normal;
-            scatter_padded(corner[k], state.position.data(), pack.corner[k].data());
+            scatter_padded(corner[k], rows.position.data(), pack.corner[k].data());
         }
     }
     return moved;
 }
 
 template <Real Scalar>
-MEMBRANE_FLATTEN ContactPass<Scalar> solve_contacts(StepState<Scalar>& state, const ContactTool<Scalar>& tool,
+MEMBRANE_FLATTEN ContactPass<Scalar> solve_contacts(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
+                                                    const ContactTool<Scalar>& tool,
                                                     std::span<ContactPack<Scalar>> packs, bool again) noexcept {
     using Wide = Lanes<Scalar>;
     ContactPass<Scalar> pass;
     Wide largest = 0;
     for (auto& pack : packs) {
         if (again && !pack.acts) continue;
-        auto corner = detail::corners_of(state, pack);
+        auto corner = detail::corners_of(rows, pack);
         detail::locate(tool, corner, pack);
-        if (pack.on_fixed) detail::add_forces(state, pack);  // fixed corners respond to the forces so far
-        const auto support = detail::support_of(state, pack);
+        if (pack.on_fixed) detail::add_forces(rows, contacts, pack);  // fixed corners respond to the forces so far
+        const auto support = detail::support_of(contacts, pack);
         const Wide gap = detail::gap_of(tool, pack, support);
         const auto acts = (pack.used > 0) & ((pack.load.force > 0) | (gap < 0));
         pack.acts = any(acts);
@@ -421,34 +427,36 @@ MEMBRANE_FLATTEN ContactPass<Scalar> solve_contacts(StepState<Scalar>& state, co
         const auto allowed = static_cast<Scalar>(deep_overlap * deep_overlap);
         const Wide edge_square = squared_norm<Wide>(corner[1].point - corner[0].point);
         pass.deep = pass.deep || any((pack.used > 0) & (gap < 0) & (gap * gap > allowed * edge_square));
-        const auto response = detail::response_of(state, support, pack);
-        const Wide tolerance = detail::gap_tolerance(state, corner, pack, support);
-        largest = larger<Wide>(largest, detail::solve(state, acts, gap, tolerance, response, corner, pack, pass));
-        if (pack.on_fixed) detail::add_forces(state, pack);
+        const auto response = detail::response_of(rows, support, pack);
+        const Wide tolerance = detail::gap_tolerance(rows, corner, pack, support);
+        largest = larger<Wide>(largest, detail::solve(rows, acts, gap, tolerance, response, corner, pack, pass));
+        if (pack.on_fixed) detail::add_forces(rows, contacts, pack);
     }
     pass.largest = detail::largest_of(largest);
     return pass;
 }
 
 template <Real Scalar>
-MEMBRANE_FLATTEN void apply_forces(StepState<Scalar>& state, std::span<ContactPack<Scalar>> packs) noexcept {
+MEMBRANE_FLATTEN void apply_forces(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
+                                   std::span<ContactPack<Scalar>> packs) noexcept {
     for (auto& pack : packs) {
         auto& load = pack.load;
         if (any(load.force > 0)) {
-            const auto corner = detail::corners_of(state, pack);
+            const auto corner = detail::corners_of(rows, pack);
             load.stiffness = detail::rocking_stiffness<Lanes<Scalar>>(
                 {corner[0].point, corner[1].point, corner[2].point}, load.weights, load.force * abs(pack.distance));
-            detail::add_forces(state, pack);
+            detail::add_forces(rows, contacts, pack);
         } else if (any(pack.applied.force > 0)) {
             load.stiffness = Vector3<Lanes<Scalar>>::Zero();
-            detail::add_forces(state, pack);
+            detail::add_forces(rows, contacts, pack);
         }
     }
 }
 
 template <Real Scalar>
-Scalar largest_squared_move(const StepState<Scalar>& state, std::span<const Index> vertices) noexcept {
+Scalar largest_squared_move(const VertexRows<Scalar>& rows, const ContactState<Scalar>& contacts) noexcept {
     using Wide = Lanes<Scalar>;
+    const auto vertices = contacts.candidates.items();
     Wide largest = 0;
     std::array<Index, Wide::count> begins;
     for (std::size_t first = 0; first < vertices.size(); first += Wide::count) {
@@ -456,7 +464,7 @@ Scalar largest_squared_move(const StepState<Scalar>& state, std::span<const Inde
             begins[i] = begin_of_row(vertices[(std::min)(first + i, vertices.size() - 1)]);
         }
         const Vector3<Wide> by =
-            gather(state.position.data(), begins.data()) - gather(state.anchor.data(), begins.data());
+            gather(rows.position.data(), begins.data()) - gather(contacts.kept_position.data(), begins.data());
         largest = larger<Wide>(largest, squared_norm(by));
     }
     return detail::largest_of(largest);

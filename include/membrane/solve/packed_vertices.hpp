@@ -33,7 +33,7 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 
 /// The vertices of a queue, and then others, in packs of one vertex for each lane. A pack stores for each vertex its
 /// springs, its volume spring and whether it is free. The vertices are in groups, colour classes: no spring joins two
-/// vertices of a group, and all vertices of a pack are of one group. Positions are in `StepState`. From the first
+/// vertices of a group, and all vertices of a pack are of one group. Positions are in `VertexRows`. From the first
 /// vertex beyond the capacity on, vertices are left out. A law, rule, element or foundation that does not take `Lanes`
 /// is asked for one vertex after the other: the results are equal to the bit.
 template <Real Scalar>
@@ -96,7 +96,7 @@ class PackedVertices {
     }
 
     /// Copies the step's volume springs, masses and fixed vertices into the packs from number `first` on.
-    /// @pre `StepState` has loaded the positions of `needed`
+    /// @pre `VertexRows` has loaded the positions of `needed`
     template <class Scene>
     void begin_step(const Scene& scene, std::size_t first = 0) noexcept;
 
@@ -214,7 +214,7 @@ class PackedVertices {
                                                   const Scene& scene) const noexcept;
 
     void keep_response(std::size_t p, const PackState& at, const Symmetric3<Wide>& block,
-                       StepState<Scalar>& rows) const noexcept;
+                       VertexRows<Scalar>& rows) const noexcept;
 
     // The capacity allows for packs that are half empty.
     [[nodiscard]] static std::size_t packs_for(std::size_t vertices) noexcept {
@@ -344,7 +344,7 @@ void PackedVertices<Scalar>::begin_step(const Scene& scene, std::size_t first) n
         const auto members = vertices(p);
         for (std::size_t i = 0; i < members.size(); ++i) {
             const Index v = members[i];
-            if (!scene.state.is_fixed(v)) {
+            if (!scene.rows.is_fixed(v)) {
                 terms.free.set(i, 1);
                 ++terms.free_count;
             }
@@ -363,7 +363,7 @@ template <class Sum, class Scene>
 MEMBRANE_INLINE Sum PackedVertices<Scalar>::springs_on(std::size_t p, const Vector3<Wide>& here,
                                                        const Scene& scene) const noexcept {
     Sum sum{};
-    const auto* rows = scene.state.position.data();
+    const auto* rows = scene.rows.position.data();
     const auto own_slots = std::span(slots_).subspan(packs_[p].slot, packs_[p].slot_count);
     constexpr std::size_t grain_size = 6;
     std::array<SpringEdge<Wide>, grain_size> edges;
@@ -418,7 +418,7 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::foundation_on(std::size_t p, const 
 template <Real Scalar>
 MEMBRANE_INLINE void PackedVertices<Scalar>::keep_response(std::size_t p, const PackState& at,
                                                            const Symmetric3<Wide>& block,
-                                                           StepState<Scalar>& rows) const noexcept {
+                                                           VertexRows<Scalar>& rows) const noexcept {
     const auto may_move = terms_[p].free != 0;
     const auto kept = [&](const Wide& number) { return select<Wide>(may_move, number, 0); };
     const Wide internal_force = norm<Wide>(at.vertex.force - at.constraint_force);
@@ -434,7 +434,7 @@ template <Real Scalar>
 template <bool in_contact, class Rule, class Scene>
 MEMBRANE_INLINE auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene& scene, bool forced) const noexcept
     -> PackState {
-    StepState<Scalar>& rows = scene.state;
+    VertexRows<Scalar>& rows = scene.rows;
     const auto& own = packs_[p].own;
     PackState at;
     at.here = gather(rows.position.data(), own.data());
@@ -472,7 +472,7 @@ template <Real Scalar>
 template <bool in_contact, class Scene, class Rule>
 MEMBRANE_INLINE auto PackedVertices<Scalar>::move(std::size_t p, const PackState& at, const Scene& scene,
                                                   const Rule& rule) noexcept -> Outcome {
-    StepState<Scalar>& rows = scene.state;
+    VertexRows<Scalar>& rows = scene.rows;
     const auto& own = packs_[p].own;
     const auto may_move = terms_[p].free != 0;
     const bool in_queue = in_contact || p < assigned_.packs;
@@ -524,7 +524,7 @@ template <Real Scalar>
 template <class Scene>
 auto PackedVertices<Scalar>::energy_change(std::size_t p, const Vector3<Wide>& here, const Vector3<Wide>& displacement,
                                            const Scene& scene) const noexcept -> EnergyChange<Wide> {
-    const auto* rows = scene.state.position.data();
+    const auto* rows = scene.rows.position.data();
     EnergyChange<Wide> sum;
     for (const Slot& slot : std::span(slots_).subspan(packs_[p].slot, packs_[p].slot_count)) {
         const auto& law = scene.network.law();
@@ -558,7 +558,7 @@ MEMBRANE_FLATTEN void PackedVertices<Scalar>::update_two(std::size_t p, const Sc
 template <Real Scalar>
 template <class Scene>
 MEMBRANE_FLATTEN void PackedVertices<Scalar>::evaluate_residual(std::size_t p, const Scene& scene) const noexcept {
-    StepState<Scalar>& rows = scene.state;
+    VertexRows<Scalar>& rows = scene.rows;
     const auto& own = packs_[p].own;
     const Vector3<Wide> here = gather(rows.position.data(), own.data());
     auto springs = springs_on<VertexForce<Wide>>(p, here, scene);

@@ -16,13 +16,14 @@
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/solve/active_vertices.hpp>
 #include <membrane/solve/constraints.hpp>
+#include <membrane/solve/contact_state.hpp>
 #include <membrane/solve/deadline.hpp>
 #include <membrane/solve/packed_vertices.hpp>
 #include <membrane/solve/predictor.hpp>
 #include <membrane/solve/rigid_support.hpp>
 #include <membrane/solve/step.hpp>
 #include <membrane/solve/step_rule.hpp>
-#include <membrane/solve/step_state.hpp>
+#include <membrane/solve/vertex_rows.hpp>
 #include <membrane/solve/vertex_update.hpp>
 #include <membrane/surface/vertex_split.hpp>
 
@@ -114,9 +115,10 @@ class QuasiStaticSolver {
     /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        visit(self.active_, self.state_, self.predictor_, self.last_prescribed_, self.woken_, self.placed_, self.moved_,
-              self.last_displacements_, self.pins_, self.fixed_at_, self.pins_known_, self.complete_, self.pose_,
-              self.deformations_, self.resume_, self.costs_);
+        visit(self.active_, self.rows_, self.contacts_, self.asleep_below_, self.splits_, self.predictor_,
+              self.last_prescribed_, self.woken_, self.placed_, self.moved_, self.last_displacements_, self.pins_,
+              self.fixed_at_, self.pins_known_, self.complete_, self.pose_, self.deformations_, self.resume_,
+              self.costs_);
         if constexpr (Visit::restores) self.report_ = {};
     }
 
@@ -124,8 +126,8 @@ class QuasiStaticSolver {
     /// sum is its reaction. Empty for a constraint without contact points, and after a
     /// step with unstable or infinite forces. Valid until the next step.
     [[nodiscard]] std::span<const ContactPoint<Scalar>> contact_points(std::size_t i) const& noexcept {
-        if (i >= state_.previous_ranges.size()) return {};
-        return state_.previous_ranges[i].of(state_.previous_points.items());
+        if (i >= contacts_.previous_ranges.size()) return {};
+        return contacts_.previous_ranges[i].of(contacts_.previous_points.items());
     }
     void contact_points(std::size_t) && = delete;
 
@@ -143,7 +145,7 @@ class QuasiStaticSolver {
     using Constraints = std::span<const ConstraintRef<Scalar>>;
     template <class... C>
     [[nodiscard]] static std::array<ConstraintRef<Scalar>, sizeof...(C)> refer_to(const C&... constraints) noexcept {
-        static_assert(sizeof...(C) <= StepState<Scalar>::max_constraints, "a step takes 16 constraints at most");
+        static_assert(sizeof...(C) <= max_constraints, "a step takes 16 constraints at most");
         return {ConstraintRef<Scalar>(constraints)...};
     }
 
@@ -199,7 +201,7 @@ class QuasiStaticSolver {
     [[nodiscard]] bool advances() const noexcept { return report_.status == StepStatus::advanced; }
     // Number of loaded vertices that this step does not update.
     [[nodiscard]] std::size_t beyond() const noexcept {
-        return state_.loaded.items().size() - active_.vertices().size();
+        return rows_.loaded.items().size() - active_.vertices().size();
     }
     void find_forces_beyond() noexcept;
     [[nodiscard]] bool goes_on(std::size_t i) noexcept;
@@ -223,7 +225,8 @@ class QuasiStaticSolver {
     AnyExecutor executor_;
     ActiveVertices active_;
     PackedVertices<Scalar> packed_, spare_;  // spare: beyond the capacity of the other
-    StepState<Scalar> state_;
+    VertexRows<Scalar> rows_;
+    ContactState<Scalar> contacts_;
     IndexSet last_prescribed_;
     IndexSet woken_;                     // since the last step
     IndexSet placed_;                    // by a tear, since the last step that advanced
@@ -232,13 +235,15 @@ class QuasiStaticSolver {
     FixedVector<Index> pins_;            // the pinned vertices
     Points<Scalar> fixed_at_;            // of pinned and prescribed vertices in the last step that advanced [m]
     bool pins_known_ = false;            // whether there was one
-    Predictor<Scalar, StepState<Scalar>::max_constraints> predictor_;
-    std::array<Vector3<Scalar>, StepState<Scalar>::max_constraints> reactions_{};
+    Predictor<Scalar, max_constraints> predictor_;
+    std::array<Vector3<Scalar>, max_constraints> reactions_{};
     StepReport<Scalar> report_;
     Progress progress_;
     bool complete_ = false;           // the last step made all its vertex updates
     RigidFrame<Scalar> pose_;         // of the body at the last step
     std::uint64_t deformations_ = 0;  // of the body at the last step
+    Index splits_ = 0;                // of a tear, until now
+    Scalar asleep_below_ = 0;         // no vertex that has moved is asleep under a larger force than this [N]
     std::size_t resume_ = 0;          // number beyond layer 0 of the vertex at which time ran out
     StepCosts costs_;
 };
@@ -286,7 +291,8 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const
       active_(network.vertex_count()),
       packed_(network, options.max_packed_vertices),
       spare_(network, options.max_packed_vertices < network.vertex_count() ? static_cast<Index>(updates_in_batch) : 0),
-      state_(network.vertex_count(), options.max_contact_points),
+      rows_(network.vertex_count()),
+      contacts_(network.vertex_count(), options.max_contact_points),
       last_prescribed_(network.vertex_count()),
       woken_(last_prescribed_),
       placed_(FollowsSplit<Network> ? network.vertex_count() : 0),  // no memory where nothing tears
@@ -296,7 +302,7 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const
       fixed_at_(Points<Scalar>::Zero(3, network.vertex_count())) {
     detail::define_made<QuasiStaticSolver>();
     if constexpr (requires { rule.validate(); }) rule.validate();
-    if constexpr (requires { network.splits(); }) state_.splits = network.splits();
+    if constexpr (requires { network.splits(); }) splits_ = network.splits();
     if constexpr (requires { requires Rule::needs_mass; }) {
         if (!network.has_masses()) refuse("QuasiStaticSolver", "the rule needs masses [kg], the network has none");
     }
@@ -314,30 +320,31 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     detail::require_made<QuasiStaticSolver>();
     reactions_.fill(Vector3<Scalar>::Zero());
     report_ = {.reactions = {reactions_.data(), constraints.size()}};
-    const Index count = state_.vertex_count();
+    const Index count = rows_.vertex_count();
     if (x.cols() != count || network.vertex_count() != count || !has_vertices(volume, count))
         return refuse_step(StepStatus::wrong_vertex_count);
     if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) return refuse_step(StepStatus::bad_time_step);
     const bool body_moved = follow_body(volume);  // uses the vertices loaded by the last step
-    state_.begin_step();
-    state_.force_tolerance = detail::tolerance_of(options_, network, volume, dt);
+    rows_.begin_step();
+    contacts_.begin_step();
+    rows_.force_tolerance = detail::tolerance_of(options_, network, volume, dt);
     // Views: `x` does not change before the end of the step, and `now` shows each update.
-    const ConstPointsRef<Scalar> start = x, now = state_.positions();
-    ConstraintContext<Scalar> context(start, state_, network);
+    const ConstPointsRef<Scalar> start = x, now = rows_.positions();
+    ConstraintContext<Scalar> context(start, rows_, contacts_, network, splits_);
     const ConstraintList<Scalar> acting(context, constraints);
     const StepStatus begun = begin_constraints(acting, context, network, volume);
     if (begun != StepStatus::advanced) return refuse_step(begun);
 
-    const StepInput<Scalar, Network, Volume> scene{start, now, dt, network, volume, state_};
-    set_supports(scene, options_.rigid_stiffness, state_.seeds.items());
+    const StepInput<Scalar, Network, Volume> scene{start, now, dt, network, volume, rows_};
+    set_supports(scene, contacts_, options_.rigid_stiffness, rows_.seeds.items());
     seed_beside_moved_pins(network, context, body_moved);
     select(network, context);
     progress_ = {.budget = budget, .resume = resume_};
     load_and_pack(scene);
     sweep(scene, acting);
     if (advances() && !evaluate_residuals(scene)) {
-        state_.reset_points();  // a force of the last step may have diverged
-        state_.restore(start);  // not bounded at the start positions either: the input is invalid
+        contacts_.reset_points();  // a force of the last step may have diverged
+        rows_.restore(start);      // not bounded at the start positions either: the input is invalid
         report_.status = evaluate_residuals(scene) ? StepStatus::unstable : StepStatus::invalid_input;
     }
     if (advances() && !acting.react(reactions_)) report_.status = StepStatus::unstable;
@@ -366,11 +373,10 @@ StepStatus QuasiStaticSolver<Scalar, Rule>::begin_constraints(const ConstraintLi
     };
     compare_splits(volume, StepStatus::foundation_missed_split);
     compare_splits(network, StepStatus::network_missed_split);
-    if (state_.missed == StepStatus::advanced) acting.begin();
-    if (state_.missed != StepStatus::advanced) return state_.missed;
-    report_.invalid_constraint = state_.invalid_constraint;
-    if (state_.invalid) return StepStatus::invalid_input;
-    return state_.full ? StepStatus::too_many_contact_points : StepStatus::advanced;
+    if (context.refusal() == StepStatus::advanced) acting.begin();
+    const StepStatus refusal = context.refusal();
+    if (refusal == StepStatus::invalid_input) report_.invalid_constraint = context.invalid_constraint();
+    return refusal;
 }
 
 // If the body has moved since the last step, and the membrane with it, rotates the cached vectors and returns true.
@@ -383,7 +389,8 @@ bool QuasiStaticSolver<Scalar, Rule>::follow_body([[maybe_unused]] const Volume&
         if (deformed) wake_all();
         if (body.pose().same_pose(pose_)) return deformed;
         const auto motion = motion_between(std::exchange(pose_, body.pose()), body.pose());
-        state_.rotate(motion.rotation);
+        rows_.rotate(motion.rotation);
+        contacts_.rotate(motion.rotation);
         for (const Index v : options_.predict ? moved_.items() : std::span<Index>()) {
             last_displacements_.col(v) = motion.vector_to_world(point(last_displacements_, v));
         }
@@ -400,7 +407,7 @@ template <class Volume>
 void QuasiStaticSolver<Scalar, Rule>::extrapolate(const ConstraintList<Scalar>& acting,
                                                   ConstraintContext<Scalar>& context) noexcept {
     if (!options_.predict) return;
-    std::array<DrivingInput<Scalar>, StepState<Scalar>::max_constraints> inputs{};
+    std::array<DrivingInput<Scalar>, max_constraints> inputs{};
     acting.collect_inputs(inputs);
     for (auto& input : inputs) {
         if (!input) continue;
@@ -455,7 +462,7 @@ void QuasiStaticSolver<Scalar, Rule>::select(const Network& network,
         }
     }
     woken_.clear();
-    active_.begin_step(network, state_.seeds.items(), options_);
+    active_.begin_step(network, rows_.seeds.items(), options_);
 }
 
 // Loads the positions of the active vertices and their neighbours. The first vertices, up to the capacity, are packed
@@ -470,7 +477,7 @@ void QuasiStaticSolver<Scalar, Rule>::load_and_pack(const Scene& scene) noexcept
     packed_.append(active_.vertices(), from_queue.size(), active_.colour_ends(), scene.network);
     load_packs(scene, 0);
     for (const auto vertices :
-         {active_.vertices().subspan(progress_.in_packs), active_.frontier(), state_.prescribed.items()}) {
+         {active_.vertices().subspan(progress_.in_packs), active_.frontier(), rows_.prescribed.items()}) {
         for (const Index v : vertices) load_neighbours(scene, v);
     }
     find_forces_beyond();
@@ -480,7 +487,7 @@ void QuasiStaticSolver<Scalar, Rule>::load_and_pack(const Scene& scene) noexcept
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Scene>
 void QuasiStaticSolver<Scalar, Rule>::load_packs(const Scene& scene, std::size_t first) noexcept {
-    for (const Index v : packed_.needed()) state_.load(v, scene.start, scene.network);
+    for (const Index v : packed_.needed()) rows_.load(v, scene.start, scene.network);
     packed_.begin_step(scene, first);
     progress_.in_packs = packed_.size();
 }
@@ -488,17 +495,17 @@ void QuasiStaticSolver<Scalar, Rule>::load_packs(const Scene& scene, std::size_t
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Scene>
 void QuasiStaticSolver<Scalar, Rule>::load_neighbours(const Scene& scene, Index v) noexcept {
-    state_.load(v, scene.start, scene.network);
-    for (const auto& end : scene.network.neighbours(v)) state_.load(end.other, scene.start, scene.network);
+    rows_.load(v, scene.start, scene.network);
+    for (const auto& end : scene.network.neighbours(v)) rows_.load(end.other, scene.start, scene.network);
 }
 
 // Whether a constraint adds a force beyond layer 0: only then the forces there are read.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 void QuasiStaticSolver<Scalar, Rule>::find_forces_beyond() noexcept {
-    const auto forced = state_.forced.items();
+    const auto forced = rows_.forced.items();
     const auto unseen = forced.subspan(std::exchange(progress_.forces_seen, forced.size()));
     progress_.forced_beyond |=
-        std::any_of(unseen.begin(), unseen.end(), [&](Index v) { return !state_.seeds.contains(v); });
+        std::any_of(unseen.begin(), unseen.end(), [&](Index v) { return !rows_.seeds.contains(v); });
 }
 
 // Sweeps until no vertex moves, `sweeps` are done, or time is up. A sweep is contact iterations, each of which updates
@@ -515,8 +522,8 @@ void QuasiStaticSolver<Scalar, Rule>::sweep(const Scene& scene, const Constraint
         if (moved) progress_.constraints_hold = false;
         changed |= moved;
         // The queue needs no more. If vertices outside have waited for it, they are next.
-        if (!changed && state_.outside_tolerance() > state_.force_tolerance) {
-            state_.queue_residual = 0;
+        if (!changed && rows_.outside_tolerance() > rows_.force_tolerance) {
+            rows_.queue_residual = 0;
             changed = true;
         }
     }
@@ -583,7 +590,7 @@ bool QuasiStaticSolver<Scalar, Rule>::add_layer(const Scene& scene) noexcept {
     }
     report_.vertex_updates += static_cast<Index>(frontier.size());
     const bool needed = std::any_of(frontier.begin(), frontier.end(), [&](Index v) {
-        return !state_.is_fixed(v) && norm(total_force(scene, v).force) > state_.force_tolerance;
+        return !rows_.is_fixed(v) && norm(total_force(scene, v).force) > rows_.force_tolerance;
     });
     progress_.budget.updated(frontier.size());
     if (!needed) return false;
@@ -676,26 +683,26 @@ bool QuasiStaticSolver<Scalar, Rule>::update_packs(const Scene& scene, PackedVer
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Scene>
 bool QuasiStaticSolver<Scalar, Rule>::evaluate_residuals(const Scene& scene) noexcept {
-    const bool constrained = !state_.forced.items().empty() || !state_.prescribed.items().empty();
+    const bool constrained = !rows_.forced.items().empty() || !rows_.prescribed.items().empty();
     const Scalar largest = detail::too_large<Scalar> / (constrained ? 100 : 1);
     Scalar squares = 0;
     const auto count = [&](Index v) {
-        const Vector3<Scalar> force = state_.residual_force(v);
+        const Vector3<Scalar> force = rows_.residual_force(v);
         ++report_.vertex_updates;
-        if (!state_.is_fixed(v)) {
+        if (!rows_.is_fixed(v)) {
             report_.residual = (std::max)(report_.residual, norm(force));
             if (active_.queue().contains(v))
                 progress_.queue_residual = (std::max)(progress_.queue_residual, norm(force));
         }
-        squares += squared_norm(force) + squared_norm<Scalar>(force - state_.constraint_force(v)) +
-                   squared_norm(state_.position_of(v));
+        squares += squared_norm(force) + squared_norm<Scalar>(force - rows_.constraint_force(v)) +
+                   squared_norm(rows_.position_of(v));
     };
     const auto evaluate = [&](Index v) {
         const Vector3<Scalar> force = total_force(scene, v).force;
-        state_.set_residual(v, force, norm(undamped_force(scene, v, force)));
+        rows_.set_residual(v, force, norm(undamped_force(scene, v, force)));
         count(v);
     };
-    const auto& prescribed = state_.prescribed;
+    const auto& prescribed = rows_.prescribed;
     for (std::size_t p = 0; p < packed_.count(); ++p) {
         packed_.evaluate_residual(p, scene);
         for (const Index v : packed_.vertices(p)) {
@@ -716,8 +723,8 @@ template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Network>
 void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Network& network) noexcept {
     moved_.clear();
-    for (const Index v : state_.loaded.items()) {
-        const Vector3<Scalar> now = state_.position_of(v), before = point(x, v);
+    for (const Index v : rows_.loaded.items()) {
+        const Vector3<Scalar> now = rows_.position_of(v), before = point(x, v);
         if (now == before) continue;
         moved_.try_push_back(v);
         if (options_.predict) last_displacements_.col(v) = now - before;
@@ -730,34 +737,33 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
     }
     placed_.clear();
     report_.moved = moved_.items();
-    state_.queue_residual = options_.adaptive_layers ? Scalar(0) : progress_.queue_residual;
-    const Scalar tolerance = state_.force_tolerance, outside = state_.outside_tolerance();
+    rows_.queue_residual = options_.adaptive_layers ? Scalar(0) : progress_.queue_residual;
+    const Scalar tolerance = rows_.force_tolerance, outside = rows_.outside_tolerance();
     const auto is_balanced = [&](Index v) {
-        const bool fixed = state_.loaded.contains(v) ? state_.is_fixed(v) : network.pinned(v);
+        const bool fixed = rows_.loaded.contains(v) ? rows_.is_fixed(v) : network.pinned(v);
         const Scalar largest = active_.queue().contains(v) ? tolerance : outside;
-        return fixed || state_.unbalanced_force(v) <= largest;
+        return fixed || rows_.unbalanced_force(v) <= largest;
     };
     // Now and then, as this costs all that has moved since the last equilibrium.
-    const bool recheck = outside < state_.asleep_below && (outside == tolerance || outside < state_.asleep_below / 4);
-    state_.asleep_below = recheck ? outside : (std::max)(state_.asleep_below, outside);
+    const bool recheck = outside < asleep_below_ && (outside == tolerance || outside < asleep_below_ / 4);
+    asleep_below_ = recheck ? outside : (std::max)(asleep_below_, outside);
     report_.converged = active_.end_step(network, is_balanced, report_.moved, recheck) &&
-                        !progress_.constraints_changed && report_.residual <= tolerance &&
-                        state_.asleep_below <= tolerance;
+                        !progress_.constraints_changed && report_.residual <= tolerance && asleep_below_ <= tolerance;
     if (options_.relative_tolerance > 0 && !report_.out_of_time && !active_.truncated()) {
         Scalar felt = 0;
         for (const auto& reaction : report_.reactions) felt += norm(reaction);
-        const Scalar largest = (std::max)(report_.residual, state_.asleep_below);
+        const Scalar largest = (std::max)(report_.residual, asleep_below_);
         report_.converged = report_.converged || (felt > 0 && largest <= options_.relative_tolerance * felt);
     }
     complete_ = !report_.out_of_time && !active_.truncated();
     keep_fixed_positions(x);
-    state_.end_step();
+    contacts_.end_step();
 }
 
 // For `seed_beside_moved_pins` in the next step.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 void QuasiStaticSolver<Scalar, Rule>::keep_fixed_positions(const PointsRef<Scalar>& x) noexcept {
-    std::swap(last_prescribed_, state_.prescribed);
+    std::swap(last_prescribed_, rows_.prescribed);
     for (const auto fixed : {std::span<const Index>(pins_.items()), last_prescribed_.items()}) {
         for (const Index v : fixed) fixed_at_.col(v) = point(x, v);
     }
@@ -769,14 +775,13 @@ void QuasiStaticSolver<Scalar, Rule>::keep_fixed_positions(const PointsRef<Scala
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Scene>
 void QuasiStaticSolver<Scalar, Rule>::measure_beyond(const Scene& scene) noexcept {
-    for (const Index v : state_.loaded.items()) {
+    for (const Index v : rows_.loaded.items()) {
         const auto around = scene.network.neighbours(v);
         const auto is_updated = [&](const auto& end) { return active_.updates(end.other); };
-        if (active_.updates(v) || state_.is_fixed(v) || std::none_of(around.begin(), around.end(), is_updated))
-            continue;
+        if (active_.updates(v) || rows_.is_fixed(v) || std::none_of(around.begin(), around.end(), is_updated)) continue;
         const Vector3<Scalar> here = point(scene.start, v);
         const Vector3<Scalar> force = scene.network.force_on(v, scene.start).force +
-                                      scene.volume.force_on(v, here, here, scene.dt).force + state_.constraint_force(v);
+                                      scene.volume.force_on(v, here, here, scene.dt).force + rows_.constraint_force(v);
         report_.residual_beyond = (std::max)(report_.residual_beyond, norm(force));
         report_.unsupported += force;
     }
@@ -784,7 +789,7 @@ void QuasiStaticSolver<Scalar, Rule>::measure_beyond(const Scene& scene) noexcep
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::refuse_step(StepStatus status) noexcept {
-    if (status == StepStatus::unstable) state_.reset_points();  // a force of the last step may have diverged
+    if (status == StepStatus::unstable) contacts_.reset_points();  // a force of the last step may have diverged
     predictor_.reset();
     reactions_.fill(Vector3<Scalar>::Zero());
     report_.residual = report_.violation = 0;
@@ -796,18 +801,20 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::refuse_step(StepStatus statu
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 void QuasiStaticSolver<Scalar, Rule>::wake(std::span<const Index> vertices) noexcept {
     for (const Index v : vertices) {
-        if (v >= 0 && v < state_.vertex_count()) woken_.insert(v);
+        if (v >= 0 && v < rows_.vertex_count()) woken_.insert(v);
     }
 }
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 void QuasiStaticSolver<Scalar, Rule>::wake_all() noexcept {
-    for (Index v = 0; v < state_.vertex_count(); ++v) wake({&v, 1});
+    for (Index v = 0; v < rows_.vertex_count(); ++v) wake({&v, 1});
 }
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 void QuasiStaticSolver<Scalar, Rule>::split(const VertexSplit& split) noexcept {
-    state_.split(split);
+    ++splits_;
+    rows_.split(split);
+    contacts_.split(split);
     active_.network_changed();
     for (const auto& corners : split.corners) wake(corners);
     wake({&split.copy, 1});
@@ -829,7 +836,9 @@ void QuasiStaticSolver<Scalar, Rule>::reshape(const MovedVertex<Scalar>& moved) 
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 void QuasiStaticSolver<Scalar, Rule>::reset() noexcept {
     active_.clear();
-    state_.reset();
+    rows_.reset();
+    contacts_.reset();
+    asleep_below_ = 0;
     predictor_.reset();
     complete_ = pins_known_ = false;
     fixed_at_.setZero();

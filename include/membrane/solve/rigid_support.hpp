@@ -6,6 +6,7 @@
 #include <span>
 #include <type_traits>
 
+#include <membrane/solve/contact_state.hpp>
 #include <membrane/solve/vertex_update.hpp>
 
 /// The stiffness of vertices that constraints cannot move freely, against these constraints: constraints that cannot
@@ -49,11 +50,11 @@ template <class Scalar, class Network, class Volume>
 /// or for 0 four times the largest stiffness of the vertex and its neighbours. Shared: half of that largest stiffness.
 /// Online. Cost: the springs of the vertices' neighbours.
 template <class Scalar, class Network, class Volume>
-void set_supports(const StepInput<Scalar, Network, Volume>& scene, std::type_identity_t<Scalar> stiffness,
-                  std::span<const Index> vertices) noexcept {
+void set_supports(const StepInput<Scalar, Network, Volume>& scene, ContactState<Scalar>& contacts,
+                  std::type_identity_t<Scalar> stiffness, std::span<const Index> vertices) noexcept {
     for (const Index v : vertices) {
-        const bool fixed = scene.state.is_fixed(v);
-        if (!fixed && !scene.state.shared.contains(v)) continue;
+        const bool fixed = scene.rows.is_fixed(v);
+        if (!fixed && !contacts.shared.contains(v)) continue;
         Scalar support = stiffness;
         if (stiffness == 0 || !fixed) {
             Scalar stiffest = own_stiffness(scene, v);
@@ -62,8 +63,8 @@ void set_supports(const StepInput<Scalar, Network, Volume>& scene, std::type_ide
             }
             support = (fixed ? detail::support_factor : static_cast<Scalar>(detail::shared_support_factor)) * stiffest;
         }
-        scene.state.set_support_stiffness(v, support);
-        if (fixed) scene.state.clear_response(v);
+        contacts.set_support_stiffness(v, support);
+        if (fixed) scene.rows.clear_response(v);
     }
 }
 

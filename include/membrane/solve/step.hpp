@@ -13,6 +13,9 @@
 ///     if (report.status != membrane::StepStatus::advanced) return;  // nothing has moved
 namespace membrane {
 
+/// The largest number of constraints of one step.
+inline constexpr std::size_t max_constraints = 16;
+
 /// Order of the vertex updates: the layers from the contact outward, and in each layer
 enum class UpdateOrder {
     breadth_first,  ///< as one by one in the order of the breadth-first search, [Liu07] 2.2

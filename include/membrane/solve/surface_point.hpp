@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <span>
 
 #include <membrane/solve/constraint_context.hpp>
 #include <membrane/surface/triangle.hpp>
@@ -11,6 +12,62 @@
 /// Operations of constraints on a point of a triangle: forces and displacements are distributed to the triangle's
 /// corners in proportion to their barycentric weights.
 namespace membrane {
+
+/// Sums the forces at the points on fixed or shared vertices, see `ContactState`.
+template <Real Scalar>
+void sum_support_forces(ConstraintContext<Scalar>& context, std::size_t begun = max_constraints) noexcept {
+    context.contacts().sum_support_forces(context.constraint(), begun);
+}
+
+/// The part of the constraint's force on `v` that is opposed, 0 to 1, see `rigid_support.hpp`.
+template <Real Scalar>
+[[nodiscard]] Scalar opposed_part(const ConstraintContext<Scalar>& context, Index v) noexcept {
+    if (context.fixed(v)) return 1;
+    const Vector3<Scalar> own = context.contacts().support_force(v), others = context.contacts().opposing_force(v);
+    const Scalar size = norm(own);
+    const Scalar opposing = size > 0 ? (std::max)(-dot(own, others) / size, Scalar(0)) : norm(others);
+    return opposing > 0 ? opposing / (size + opposing) : Scalar(0);
+}
+
+/// Displacement of a fixed or shared vertex under the constraint: the opposed part of its force over the support
+/// stiffness [m]; zero for other vertices.
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> support_displacement(const ConstraintContext<Scalar>& context, Index v) noexcept {
+    const auto& contacts = context.contacts();
+    const Scalar stiffness = contacts.support_stiffness(v);
+    if (!contacts.pressed_supports.contains(v) || !(stiffness > 0)) return Vector3<Scalar>::Zero();
+    return opposed_part(context, v) * contacts.support_force(v) / stiffness;
+}
+
+/// Derivative of this displacement by the force [m/N]; zero for other vertices.
+template <Real Scalar>
+[[nodiscard]] Scalar support_compliance(const ConstraintContext<Scalar>& context, Index v) noexcept {
+    const auto& contacts = context.contacts();
+    const Scalar stiffness = contacts.support_stiffness(v), part = opposed_part(context, v);
+    const bool held = context.fixed(v) || contacts.pressed_supports.contains(v);
+    return held && stiffness > 0 ? part * part / stiffness : Scalar(0);
+}
+
+/// Vertices shared with the constraint, or beside fixed ones, may move by `distance` in this step [m]: the motion of a
+/// tool or a target since the last one, and the violation.
+template <Real Scalar>
+void allow_motion(ConstraintContext<Scalar>& context, Scalar distance) noexcept {
+    Scalar& largest = context.contacts().largest_motion;
+    largest = (std::max)(largest, distance);
+}
+
+/// Moves those of `vertices` that have moved farther than that in this step back to there: a triangle that rocks
+/// between two tools may turn over in few passes.
+template <Real Scalar>
+void limit_motion(ConstraintContext<Scalar>& context, std::span<const Index> vertices) noexcept {
+    const Scalar largest = context.contacts().largest_motion;
+    for (const Index v : vertices) {
+        const Vector3<Scalar> by = context.position(v) - context.start(v);
+        const Scalar distance = norm(by);
+        if (distance > largest && !context.fixed(v))
+            context.set_position(v, context.start(v) + (largest / distance) * by);
+    }
+}
 
 /// The triangle of these vertices at their current positions.
 template <Real Scalar>
@@ -54,7 +111,7 @@ template <Real Scalar>
 template <Real Scalar>
 [[nodiscard]] bool is_on_fixed(const ConstraintContext<Scalar>& context, const std::array<Index, 3>& corners) noexcept {
     return std::any_of(corners.begin(), corners.end(),
-                       [&](Index v) { return context.fixed(v) || context.state().shared.contains(v); });
+                       [&](Index v) { return context.fixed(v) || context.contacts().shared.contains(v); });
 }
 
 /// Displaces the free corners as if all corners were free and the point moved by a displacement [m]: a point on fixed
@@ -76,7 +133,7 @@ template <Real Scalar>
     Scalar sum = 0;
     for (std::size_t k = 0; k < 3 && point.on_fixed; ++k) {
         const Scalar weight = point.weights[static_cast<Eigen::Index>(k)];
-        sum += weight * weight * context.support_compliance(point.corners[k]);
+        sum += weight * weight * support_compliance(context, point.corners[k]);
     }
     return sum;
 }
@@ -142,7 +199,7 @@ template <Real Scalar>
                                                    const ContactPoint<Scalar>& point) noexcept {
     Vector3<Scalar> sum = Vector3<Scalar>::Zero();
     for (std::size_t k = 0; k < 3 && point.on_fixed; ++k) {
-        sum += point.weights[static_cast<Eigen::Index>(k)] * context.support_displacement(point.corners[k]);
+        sum += point.weights[static_cast<Eigen::Index>(k)] * support_displacement(context, point.corners[k]);
     }
     return sum;
 }

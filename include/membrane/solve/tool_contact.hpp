@@ -79,18 +79,33 @@ struct ToolContact {
         return {tool.position, tool.axis, contact.axis_point, contact.radius};
     }
     [[nodiscard]] static auto packs(Context& context) noexcept {
-        return context.state().pack_ranges[context.constraint()].of(context.state().packs.items());
+        return context.contacts().pack_ranges[context.constraint()].of(context.contacts().packs.items());
     }
+    // The position to which `go_back` moves a vertex: that at the call of `keep`, or at the start of the step.
+    static void keep(Context& context, Index v) noexcept {
+        context.load(v);
+        context.contacts().keep(v, context.position(v));
+    }
+    static void keep_start(Context& context, Index v) noexcept {
+        context.load(v);
+        if (!context.contacts().kept.contains(v)) context.contacts().keep(v, context.start(v));
+    }
+    [[nodiscard]] static Vector3<Scalar> kept(const Context& context, Index v) noexcept {
+        return context.contacts().kept.contains(v) ? context.contacts().kept_at(v) : context.start(v);
+    }
+    static void go_back(Context& context, Scalar part) noexcept;
     [[nodiscard]] static bool on_support(const Context& context) noexcept {
         return !context.points().empty() && context.points().front().feature == fixed_feature;
     }
     // The triangle with support displacements, at the current positions and at the kept positions.
     [[nodiscard]] static Triangle<Scalar> surface_triangle(const Context& context, const Corners& corners) noexcept {
-        const auto at = [&](Index v) { return Vector3<Scalar>(context.position(v) + context.support_displacement(v)); };
+        const auto at = [&](Index v) {
+            return Vector3<Scalar>(context.position(v) + support_displacement(context, v));
+        };
         return {at(corners[0]), at(corners[1]), at(corners[2])};
     }
     [[nodiscard]] static Triangle<Scalar> kept_triangle(const Context& context, const Corners& corners) noexcept {
-        const auto at = [&](Index v) { return Vector3<Scalar>(context.kept(v) + context.support_displacement(v)); };
+        const auto at = [&](Index v) { return Vector3<Scalar>(kept(context, v) + support_displacement(context, v)); };
         return {at(corners[0]), at(corners[1]), at(corners[2])};
     }
 };
@@ -129,28 +144,28 @@ void ToolContact<Scalar>::begin(Context& context) const noexcept {
     if (contact.splits != no_index) context.compare_splits(contact.splits, StepStatus::contact_missed_split);
     if (!contact.touching() || !seed(context)) return;
     if (!contact.has_all_points) {
-        context.state().full = true;
+        context.refuse_points();
         return;
     }
-    context.allow_motion(contact.detection_distance - contact.radius + (std::max)(-contact.gap, Scalar(0)));
+    allow_motion(context, contact.detection_distance - contact.radius + (std::max)(-contact.gap, Scalar(0)));
     // Until the new points are found, fixed and shared corners are displaced by the forces of the last step.
-    context.sum_support_forces(context.constraint());
+    sum_support_forces(context, context.constraint());
     const auto out = direction_out_of_support(context);
     if (contact.tunnelled && !out) carry_with_tool(context);
     list_candidates(context);
     // A tool penetrates fixed and shared vertices at equilibrium, too.
-    const auto stays = [&](Index v) { return context.fixed(v) || context.state().shared.contains(v); };
+    const auto stays = [&](Index v) { return context.fixed(v) || context.contacts().shared.contains(v); };
     const bool held = std::any_of(contact.corners.begin(), contact.corners.end(), stays);
     if (!contact.tunnelled && !out && !held && contact.gap < -negligible_distance(context, contact.corners[0])) {
         clear_contact_point(context);
     }
     out ? touch_support(context, *out) : find_points(context);
-    if (context.state().full) return;
+    if (context.refusal() != StepStatus::advanced) return;
     pack_points(context);
     for (int pass = 0; pass < detail::max_push_passes; ++pass) {
-        if (!push_out(context.state(), shape(), packs(context))) break;
+        if (!push_out(context.rows(), context.contacts(), shape(), packs(context))) break;
     }
-    apply_forces(context.state(), packs(context));
+    apply_forces(context.rows(), context.contacts(), packs(context));
     prevent_tunnelling(context);
 }
 
@@ -179,8 +194,8 @@ template <Real Scalar>
 void ToolContact<Scalar>::list_candidates(Context& context) const noexcept {
     for (const auto& candidate : contact.candidates) {
         for (const Index v : candidate.corners) {
-            contact.tunnelled ? context.keep(v) : context.keep_start(v);
-            context.state().candidates.insert(v);
+            contact.tunnelled ? keep(context, v) : keep_start(context, v);
+            context.contacts().candidates.insert(v);
         }
     }
 }
@@ -196,7 +211,7 @@ void ToolContact<Scalar>::carry_with_tool(Context& context) const noexcept {
     const Vector3<Scalar> path = contact.axis_point - contact.previous_axis_point;
     const Scalar length = norm(path);
     for (const auto& listed : contact.triangles) {
-        for (const Index v : listed.corners) context.keep(v);
+        for (const Index v : listed.corners) keep(context, v);
     }
     for (const auto& listed : contact.triangles) {
         const auto& v = listed.corners;
@@ -206,9 +221,9 @@ void ToolContact<Scalar>::carry_with_tool(Context& context) const noexcept {
         const Scalar part = 1 - detail::fraction(hit->fraction * length - contact.radius, length);
         for (const Index corner : v) {
             if (context.fixed(corner)) continue;
-            const Vector3<Scalar> so_far = context.position(corner) - context.kept(corner);
+            const Vector3<Scalar> so_far = context.position(corner) - kept(context, corner);
             if (dot(so_far, path) < part * squared_norm(path)) {
-                context.set_position(corner, context.kept(corner) + part * path);
+                context.set_position(corner, kept(context, corner) + part * path);
             }
         }
     }
@@ -284,17 +299,17 @@ void ToolContact<Scalar>::stay_on_side(const Context& context, ContactPoint<Scal
 // Applies the points' forces and packs the points.
 template <Real Scalar>
 void ToolContact<Scalar>::pack_points(Context& context) const noexcept {
-    auto& state = context.state();
+    auto& contacts = context.contacts();
     const auto points = context.points();
     for (const auto& point : points) {
         add_point_force(context, point.corners, point.weights, point.force);
     }
-    context.sum_support_forces(context.constraint() + 1);
-    auto& range = state.pack_ranges[context.constraint()];
-    range.begin = state.packs.size();
-    state.packs.append(std::span<const ContactPoint<Scalar>>(points), state.point_ranges[context.constraint()].begin,
-                       [&](Index v) { return context.fixed(v); });
-    range.end = state.packs.size();
+    sum_support_forces(context, context.constraint() + 1);
+    auto& range = contacts.pack_ranges[context.constraint()];
+    range.begin = contacts.packs.size();
+    contacts.packs.append(std::span<const ContactPoint<Scalar>>(points),
+                          contacts.point_ranges[context.constraint()].begin, [&](Index v) { return context.fixed(v); });
+    range.end = contacts.packs.size();
 }
 
 // Fixed vertices do not yield to a tool: if it penetrates by more than its radius, its axis is behind them. Then the
@@ -339,8 +354,7 @@ bool ToolContact<Scalar>::comes_out(const Triangle<Scalar>& before, const Triang
 template <Real Scalar>
 void ToolContact<Scalar>::prevent_tunnelling(Context& context) const noexcept {
     if (on_support(context)) return;
-    const auto& state = context.state();
-    const Scalar farthest = largest_squared_move(state, state.candidates.items());
+    const Scalar farthest = largest_squared_move(context.rows(), context.contacts());
     if (4 * farthest < contact.radius * contact.radius && contact.gap > -contact.radius / 2) return;
     const Scalar rounding = detail::rounding_at(contact.axis_point);
     Scalar first = 1;
@@ -354,14 +368,23 @@ void ToolContact<Scalar>::prevent_tunnelling(Context& context) const noexcept {
         const Scalar part = clearance > contact.radius / 2 ? 1 - contact.radius / (4 * clearance) : Scalar(0.1);
         first = (std::min)(first, part * time);
     }
-    if (first < 1) context.go_back(1 - first);
+    if (first < 1) go_back(context, 1 - first);
+}
+
+// Moves all free vertices back towards their kept positions, by `part` of the distance, 0 to 1.
+template <Real Scalar>
+void ToolContact<Scalar>::go_back(Context& context, Scalar part) noexcept {
+    for (const Index v : context.rows().loaded.items()) {
+        const Vector3<Scalar> now = context.position(v), before = kept(context, v);
+        if (now != before && !context.fixed(v)) context.set_position(v, (1 - part) * now + part * before);
+    }
 }
 
 template <Real Scalar>
 bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
     if (!contact.touching()) return false;
-    const bool takes_turns = context.state().several_on_fixed;  // then another constraint's pass comes next
-    if (takes_turns) context.sum_support_forces();
+    const bool takes_turns = context.contacts().several_on_fixed;  // then another constraint's pass comes next
+    if (takes_turns) sum_support_forces(context);
     Scalar first = 0;  // largest change of a force in the first pass [N]
     bool released = false;
     const auto points = std::as_const(context).points();
@@ -369,20 +392,21 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
     const int most = detail::max_contact_passes(points.size(), on_fixed || is_shaft(tool));
     bool deep = false;
     for (int i = 0; i < (takes_turns ? 1 : detail::deep_contact_passes); ++i) {
-        const auto pass = solve_contacts(context.state(), shape(), packs(context), i > 0);
+        const auto pass = solve_contacts(context.rows(), context.contacts(), shape(), packs(context), i > 0);
         deep = pass.deep && !takes_turns;
         released = released || pass.released;
         if (i == 0) first = pass.largest;
         // Stops if the vertices need updates first.
         if (!(i + 1 < most ? pass.largest > first / 2 : pass.deep)) break;
     }
-    for (int i = 0; deep && i < detail::max_push_passes; ++i) deep = push_out(context.state(), shape(), packs(context));
+    for (int i = 0; deep && i < detail::max_push_passes; ++i)
+        deep = push_out(context.rows(), context.contacts(), shape(), packs(context));
     if (on_fixed && is_shaft(tool)) {
-        for (const auto& listed : contact.triangles) context.limit_motion(listed.corners);
+        for (const auto& listed : contact.triangles) limit_motion<Scalar>(context, listed.corners);
     }
-    apply_forces(context.state(), packs(context));
+    apply_forces(context.rows(), context.contacts(), packs(context));
     prevent_tunnelling(context);
-    if (takes_turns) context.state().packs.unpack(context.state().points.items());
+    if (takes_turns) context.contacts().packs.unpack(context.contacts().points.items());
     return first > 0 || released || has_new_overlap(context);
 }
 

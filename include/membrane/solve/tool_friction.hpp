@@ -253,8 +253,8 @@ void ToolFriction<Scalar>::hold(Vertex& v, const Vector3<Scalar>& position, cons
 template <Real Scalar>
 void ToolFriction<Scalar>::read_normal_forces(const Context& context) noexcept {
     for (Vertex& v : vertices_.items()) v.normal_force = Vector3<Scalar>::Zero();
-    const auto& state = context.state();
-    for (const auto& pack : state.pack_ranges[context.constraint()].of(state.packs.items())) {
+    const auto& contacts = context.contacts();
+    for (const auto& pack : contacts.pack_ranges[context.constraint()].of(contacts.packs.items())) {
         for (std::size_t i = 0; i < pack.size; ++i) {
             const auto& normal = pack.load.normal;
             const Vector3<Scalar> force =

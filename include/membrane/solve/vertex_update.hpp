@@ -9,13 +9,13 @@
 #include <membrane/model/mass_spring_network.hpp>
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/solve/step_rule.hpp>
-#include <membrane/solve/step_state.hpp>
+#include <membrane/solve/vertex_rows.hpp>
 
 /// One vertex update: the displacement of a vertex by the rule for the forces on it. One code serves one vertex and
 /// several.
 ///
 ///     auto state = membrane::state_of<Rule>(scene, v);
-///     const auto move = membrane::move_of(rule, state, scene.state.force_tolerance);
+///     const auto move = membrane::move_of(rule, state, scene.rows.force_tolerance);
 ///     if (move.moves) x.col(v) += membrane::backtracked<Rule>(scene, v, state, move.displacement);
 namespace membrane {
 
@@ -29,7 +29,7 @@ struct StepInput {
     Scalar dt;                            ///< [s]
     const Network& network;               ///< springs and elements
     const Volume& volume;                 ///< the foundation
-    StepState<Scalar>& state;             ///< of the solver
+    VertexRows<Scalar>& rows;             ///< of the solver
 };
 
 /// The displacement of a vertex, or of several, by a rule.
@@ -81,11 +81,11 @@ template <class Rule, Number N>
 /// Force and stiffness on vertex `v` by foundation, damping and constraints, without the network.
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] VertexForce<Scalar> non_network_force(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
-    const auto& state = scene.state;
-    const Scalar stiffness = state.contact_stiffness(v) + state.added_stiffness[static_cast<std::size_t>(v)];
-    if constexpr (std::is_same_v<Volume, NoFoundation>) return {state.constraint_force(v), stiffness};
+    const auto& rows = scene.rows;
+    const Scalar stiffness = rows.contact_stiffness(v) + rows.added_stiffness[static_cast<std::size_t>(v)];
+    if constexpr (std::is_same_v<Volume, NoFoundation>) return {rows.constraint_force(v), stiffness};
     const auto foundation = scene.volume.force_on(v, point(scene.x, v), point(scene.start, v), scene.dt);
-    return {foundation.force + state.constraint_force(v), foundation.stiffness + stiffness};
+    return {foundation.force + rows.constraint_force(v), foundation.stiffness + stiffness};
 }
 
 /// Sum of all forces on vertex `v`, and its stiffness.
