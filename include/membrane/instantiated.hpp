@@ -44,7 +44,6 @@
     PREFIX class membrane::MassSpringNetwork<SCALAR, membrane::LinearSpring>;                                    \
     PREFIX class membrane::VirtualVolumeSprings<SCALAR>;                                                         \
     PREFIX class membrane::LocalSurface<SCALAR>;                                                                 \
-    PREFIX class membrane::WideBvh<SCALAR>;                                                                      \
     PREFIX class membrane::AabbTree<SCALAR>;                                                                     \
     PREFIX class membrane::ContactTracker<SCALAR>;                                                               \
     PREFIX class membrane::Grasper<SCALAR>;                                                                      \

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/contact/wide_bvh.hpp>
+#include <membrane/contact/aabb_tree.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -32,7 +32,7 @@ TEMPLATE_TEST_CASE("a search examines the triangles whose key is below the limit
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const auto mesh = test::random_surface<S>(random).mesh();
-        const WideBvh<S> boxes(mesh, {.balance_threshold = 1 + random.index(20)});
+        const AabbTree<S> tree(mesh, {.balance_threshold = 1 + random.index(20)});
         const Vector3<S> q = point(mesh.positions(), random.index(mesh.vertex_count())) + random.vector<S>();
         const auto key = [&]<Number N>(const Aabb<N>& box) { return squared_distance(box, q); };
         std::vector<S> keys;
@@ -41,7 +41,7 @@ TEMPLATE_TEST_CASE("a search examines the triangles whose key is below the limit
             keys[static_cast<std::size_t>(random.index(mesh.triangle_count()))];  // one is at the limit: not below
 
         std::vector<Index> found, expected;
-        const Index visited = boxes.search(mesh.positions(), key, limit, [&](Index f, const Triangle<S>& triangle) {
+        const Index visited = tree.search(mesh.positions(), key, limit, [&](Index f, const Triangle<S>& triangle) {
             found.push_back(f);
             CHECK(triangle.a == point(mesh.positions(), mesh.triangles()(0, f)));
             CHECK(triangle.c == point(mesh.positions(), mesh.triangles()(2, f)));
@@ -51,14 +51,14 @@ TEMPLATE_TEST_CASE("a search examines the triangles whose key is below the limit
             if (keys[static_cast<std::size_t>(f)] < limit) expected.push_back(f);
         }
         CHECK(found == expected);
-        CHECK((visited >= 1 && visited <= boxes.statistics().nodes + 1));  // a root that is a leaf, twice
+        CHECK((visited >= 1 && visited <= tree.statistics().nodes + 1));  // a root that is a leaf, twice
     }
 }
 
 TEMPLATE_TEST_CASE("a limit that is lowered ends with the least key, soon", "[tree]", float, double) {
     using S = TestType;
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 4});
-    const WideBvh<S> boxes(mesh);
+    const AabbTree<S> tree(mesh);
     for (int seed = 1; seed <= cases(500); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
@@ -66,7 +66,7 @@ TEMPLATE_TEST_CASE("a limit that is lowered ends with the least key, soon", "[tr
         const auto key = [&]<Number N>(const Aabb<N>& box) { return squared_distance(box, q); };
         S least = (std::numeric_limits<S>::max)(), expected = least;
         int examined = 0;
-        (void)boxes.search(mesh.positions(), key, least, [&](Index f, const Triangle<S>& triangle) {
+        (void)tree.search(mesh.positions(), key, least, [&](Index f, const Triangle<S>& triangle) {
             CHECK(key(bounds(triangle)) == key(box_of(mesh, f)));
             least = (std::min)(least, key(bounds(triangle)));
             ++examined;
@@ -87,9 +87,9 @@ TEMPLATE_TEST_CASE("a query may have its own key of triangles", "[tree]", float,
         }
     };
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 2});
-    const WideBvh<S> boxes(mesh);
+    const AabbTree<S> tree(mesh);
     std::set<Index> found, expected;
-    (void)boxes.search(mesh.positions(), Key{}, S(1), [&](Index f, const auto&) { found.insert(f); });
+    (void)tree.search(mesh.positions(), Key{}, S(1), [&](Index f, const auto&) { found.insert(f); });
     for (Index f = 0; f < mesh.triangle_count(); ++f) {
         if (mesh.positions()(2, mesh.triangles()(0, f)) > 0) expected.insert(f);
     }
@@ -104,14 +104,14 @@ TEMPLATE_TEST_CASE("no key is computed from numbers that are NaN", "[tree][bad-i
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const auto mesh = test::random_surface<S>(random).mesh();
-        WideBvh<S> boxes(mesh, {.balance_threshold = 1 + random.index(20)});
+        AabbTree<S> tree(mesh, {.balance_threshold = 1 + random.index(20)});
         Points<S> x = mesh.positions().array() + far;
         Index examined = 0;
         const test::FloatingPointTraps traps;
-        boxes.refit(x);
+        tree.refit(x);
         const Vector3<S> q = point(x, 0) - Vector3<S>::Constant(far / 2);
         const auto key = [&]<Number N>(const Aabb<N>& box) { return squared_distance(box, q); };
-        (void)boxes.search(x, key, (std::numeric_limits<S>::max)(), [&](Index, const auto&) { ++examined; });
+        (void)tree.search(x, key, (std::numeric_limits<S>::max)(), [&](Index, const auto&) { ++examined; });
         CHECK(examined == mesh.triangle_count());
     }
 }
