@@ -118,10 +118,10 @@ class AabbTree : public SplitCount {
                           Scalar radius, Visit&& visit) const noexcept;
     ///@}
 
-    /// A query of your own: calls `examine(Index f, triangle)` for each triangle with a key below `limit`, of boxes with
-    /// a key below `limit`. Visits sibling boxes by ascending key; `examine` may lower the limit. `key(box)` is one
-    /// number a box; `key(triangle)` is optional: by default a triangle has the key of its box. Returns the number of
-    /// boxes visited.
+    /// A query of your own: calls `examine(Index f, triangle)` for each triangle with a key below `limit`, of boxes
+    /// with a key below `limit`. Visits sibling boxes by ascending key; `examine` may lower the limit. `key(box)` is
+    /// one number a box; `key(triangle)` is optional: by default a triangle has the key of its box. Returns the number
+    /// of boxes visited.
     template <class Key, class Examine>
     [[nodiscard]] Index search(const ConstPointsRef<Scalar>& x, Key key, const Scalar& limit,
                                Examine examine) const noexcept;
