@@ -35,6 +35,15 @@
 #include <membrane/haptics/rest_contact.hpp>
 // [/rest]
 
+// [policies]
+#include <membrane/haptics/contact_friction.hpp>
+#include <membrane/haptics/grasp_transition.hpp>
+// [/policies]
+
+// [coupling]
+#include <membrane/haptics/virtual_coupling.hpp>
+// [/coupling]
+
 // [moving]
 #include <membrane/model/moving_foundation.hpp>
 // [/moving]
@@ -537,6 +546,41 @@ TEST_CASE_METHOD(Touched, "pages: hand") {
     membrane::ReplayDevice<double> again(membrane::read_recording<double>(file));  // in place of the device
     // [/recording]
     CHECK(again.read().position == tool.position);
+}
+
+TEST_CASE_METHOD(Touched, "pages: policies on top of another") {
+    membrane::ScriptedDevice<double> device({{.time = 0}}, {.tick = 1e-3});
+    auto limit = membrane::ForceLimiter(membrane::devices::touch);
+    auto grasp = grasper.update(contact, x, tool);
+    const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+    const auto alone = feel({tool, contact, report});
+    // [policies]
+    auto rough = membrane::ContactFriction(feel, {.coefficient = 0.1, .stiffness = 100});  // [N/m], along the surface
+    auto smooth = membrane::GraspTransition(rough, {.duration = 0.1});                     // [s], at grasp and release
+    device.write(limit(smooth({tool, contact, report, grasp}), tool.time, steps));
+    // [/policies]
+    tool.position.x() += 1e-3;  // slides
+    CHECK(norm<double>(smooth({tool, contact, report, grasp}) - alone) > 0.09 * norm(alone));
+}
+
+TEST_CASE_METHOD(Touched, "pages: a coupling between hand and tool") {
+    membrane::ScriptedDevice<double> device({{0.0, {0, 0, 10.8e-3}}, {0.2, {0, 0, 10.2e-3}}}, {.radius = 1e-3});
+    auto limit = membrane::ForceLimiter(membrane::devices::touch);
+    // [coupling]
+    auto coupling = membrane::VirtualCoupling<double>({.stiffness = 300, .damping = 0.1, .scale = 20});
+    membrane::Vector3<double> reaction(0, 0, 0);
+    while (device.running()) {
+        const auto held = coupling.update(device.read(), reaction, dt);  // the tool in contact
+        const auto contact = tracker.update(tree, x, held);
+        const auto report = solver.step(x, dt, network, foundation, press(held, contact));
+        tree.refit(x, report.moved);
+        reaction = report.reactions[0];
+        device.write(limit(coupling.force(), held.time, ++steps));
+    }
+    // [/coupling]
+    // The spring from the tool to the hand has the force of the membrane, times the scale.
+    CHECK(coupling.force().z() == Approx(20 * reaction.z()).epsilon(0.05));
+    CHECK(coupling.force().z() > 0.1);
 }
 
 // The lines of the loop and those of the hand, together, as a user has them.

@@ -33,8 +33,8 @@ struct ListRange {
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
-/// The contacts of a step, and what they keep for the next one: the points of all constraints, the forces on fixed and
-/// shared vertices (see `rigid_support.hpp`), and the positions behind which a contact does not fall.
+/// The contacts of a step, and what they keep for the next one: the points of all constraints; the forces on fixed and
+/// shared vertices, see `rigid_support.hpp`; the positions to which vertices go back if the tool would tunnel.
 template <Real Scalar>
 struct ContactState {
     using Rows = std::vector<PaddedPoint<Scalar>>;  ///< a row for each vertex
