@@ -43,7 +43,7 @@ struct ContactState {
     ContactState(Index vertex_count, Index max_contact_points);
 
     /// Number of vertices V.
-    [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(owner.size()); }
+    [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(owner_.size()); }
 
     void begin_step() noexcept;    ///< Without points and forces.
     void end_step() noexcept;      ///< Keeps the contact points of this step for the next one.
@@ -65,10 +65,10 @@ struct ContactState {
     ///@{
     /// The first of the previous points whose first corner is `v`, and the next one with this corner; or `no_index`.
     [[nodiscard]] Index previous_at(Index v) const noexcept {
-        return v >= 0 && v < vertex_count() ? first_previous[static_cast<std::size_t>(v)] : no_index;
+        return v >= 0 && v < vertex_count() ? first_previous_[static_cast<std::size_t>(v)] : no_index;
     }
     [[nodiscard]] Index next_previous(Index point) const noexcept {
-        return next_of_same_corner[static_cast<std::size_t>(point)];
+        return next_of_same_corner_[static_cast<std::size_t>(point)];
     }
     ///@}
 
@@ -137,9 +137,9 @@ struct ContactState {
     void clear_supports() noexcept;
     void index_previous_points() noexcept;
 
-    std::vector<Index> first_previous;       // of each vertex, the last previous point of which it is the first corner
-    std::vector<Index> next_of_same_corner;  // of each previous point
-    std::vector<unsigned char> owner;        // scratch of `find_shared`
+    std::vector<Index> first_previous_;       // of each vertex, the last previous point of which it is the first corner
+    std::vector<Index> next_of_same_corner_;  // of each previous point
+    std::vector<unsigned char> owner_;        // scratch of `find_shared`
 };
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
@@ -156,9 +156,9 @@ ContactState<Scalar>::ContactState(Index vertices, Index max_contact_points)
       points(static_cast<std::size_t>(max_contact_points)),
       previous_points(points),
       packs(vertices, static_cast<std::size_t>(max_contact_points)),
-      first_previous(static_cast<std::size_t>(vertices), no_index),
-      next_of_same_corner(points.capacity(), no_index),
-      owner(static_cast<std::size_t>(vertices), 0) {}
+      first_previous_(static_cast<std::size_t>(vertices), no_index),
+      next_of_same_corner_(points.capacity(), no_index),
+      owner_(static_cast<std::size_t>(vertices), 0) {}
 
 template <Real Scalar>
 void ContactState<Scalar>::begin_step() noexcept {
@@ -182,7 +182,7 @@ void ContactState<Scalar>::clear_supports() noexcept {
 
 template <Real Scalar>
 void ContactState<Scalar>::find_shared() noexcept {
-    const auto owner_of = [this](Index v) -> unsigned char& { return owner[static_cast<std::size_t>(v)]; };
+    const auto owner_of = [this](Index v) -> unsigned char& { return owner_[static_cast<std::size_t>(v)]; };
     const auto is_vertex = [this](Index v) { return v >= 0 && v < vertex_count(); };
     shared.clear();
     for (std::size_t c = 0; c < max_constraints; ++c) {
@@ -259,7 +259,7 @@ void ContactState<Scalar>::index_previous_points() noexcept {
     for (std::size_t i = 0; i < previous_points.size(); ++i) {
         const Index v = previous_points[i].corners[0];
         if (v < 0 || v >= vertex_count()) continue;
-        next_of_same_corner[i] = std::exchange(first_previous[static_cast<std::size_t>(v)], static_cast<Index>(i));
+        next_of_same_corner_[i] = std::exchange(first_previous_[static_cast<std::size_t>(v)], static_cast<Index>(i));
     }
 }
 
@@ -267,7 +267,7 @@ template <Real Scalar>
 void ContactState<Scalar>::reset_points() noexcept {
     for (const auto& point : previous_points.items()) {
         const Index v = point.corners[0];
-        if (v >= 0 && v < vertex_count()) first_previous[static_cast<std::size_t>(v)] = no_index;
+        if (v >= 0 && v < vertex_count()) first_previous_[static_cast<std::size_t>(v)] = no_index;
     }
     previous_points.clear();
     previous_ranges = {};
@@ -287,7 +287,7 @@ void ContactState<Scalar>::split(const VertexSplit& split) noexcept {
     if (shared.contains(split.vertex)) shared.insert(split.copy);
     for (auto& point : previous_points.items()) {
         const Index first = point.corners[0];
-        if (first >= 0 && first < vertex_count()) first_previous[static_cast<std::size_t>(first)] = no_index;
+        if (first >= 0 && first < vertex_count()) first_previous_[static_cast<std::size_t>(first)] = no_index;
         if (split.takes(point.triangle))
             std::replace(point.corners.begin(), point.corners.end(), split.vertex, split.copy);
     }
