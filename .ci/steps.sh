@@ -1,4 +1,4 @@
-# Sourced by .ci/run and .ci/release: named steps, each one's share of the time. Stops at the first that fails.
+# Sourced by .ci/run and .ci/release: named steps, with the time of each. Stops at the first that fails.
 # Bash; the caller has sourced cmake/setup.sh.
 
 exec < /dev/null  # no input from a terminal
