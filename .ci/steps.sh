@@ -21,8 +21,8 @@ step() {
     printf '%5d s  %s\n' "$((SECONDS - begun))" "$1" | tee --append "$passed"
 }
 
-# side_by_side STEPS STEPS: two functions of steps at the same time, as hardly any step keeps all cores busy. What the
-# second one prints follows after all of the first.
+# side_by_side STEPS STEPS: two functions of steps at the same time, since a core is idle while the other compiles the
+# last long file of a step, or packages are fetched. What the second one prints follows after all of the first.
 side_by_side() {
     local log
     log=$(mktemp)

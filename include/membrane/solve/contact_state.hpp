@@ -13,6 +13,7 @@
 #include <membrane/core/rigid_frame.hpp>
 #include <membrane/solve/contact_pack.hpp>
 #include <membrane/solve/step.hpp>
+#include <membrane/solve/vertex_rows.hpp>
 #include <membrane/surface/vertex_split.hpp>
 
 namespace membrane {
@@ -37,7 +38,7 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 /// shared vertices, see `rigid_support.hpp`; the positions to which vertices go back if the tool would tunnel.
 template <Real Scalar>
 struct ContactState {
-    using Rows = std::vector<PaddedPoint<Scalar>>;  ///< a row for each vertex
+    using Rows = typename VertexRows<Scalar>::Rows;  ///< a row for each vertex
 
     /// Allocates all memory. Cost: O(V + `max_contact_points`).
     ContactState(Index vertex_count, Index max_contact_points);
@@ -128,12 +129,7 @@ struct ContactState {
     Scalar largest_motion = 0;      ///< how far shared vertices, and those beside fixed ones, may move [m]
 
   private:
-    [[nodiscard]] static PaddedPoint<Scalar>& row(Rows& rows, Index v) noexcept {
-        return rows[static_cast<std::size_t>(v)];
-    }
-    [[nodiscard]] static const PaddedPoint<Scalar>& row(const Rows& rows, Index v) noexcept {
-        return rows[static_cast<std::size_t>(v)];
-    }
+    [[nodiscard]] static auto& row(auto& rows, Index v) noexcept { return VertexRows<Scalar>::row(rows, v); }
     void clear_supports() noexcept;
     void index_previous_points() noexcept;
 
@@ -223,11 +219,7 @@ void ContactState<Scalar>::sum_support_forces(std::size_t constraint, std::size_
             for (std::size_t k = 0; k < 3 && point.on_fixed; ++k) {
                 const Index v = point.corners[k];
                 pressed_supports.insert(v);
-                auto& number = row(rows, v).number;
-                for (std::size_t i = 0; i < 3; ++i) {
-                    number[i] +=
-                        point.weights[static_cast<Eigen::Index>(k)] * point.force[static_cast<Eigen::Index>(i)];
-                }
+                VertexRows<Scalar>::add(rows, v, point.weights[static_cast<Eigen::Index>(k)] * point.force);
             }
         }
     }

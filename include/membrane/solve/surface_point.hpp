@@ -43,9 +43,11 @@ template <Real Scalar>
 template <Real Scalar>
 [[nodiscard]] Scalar support_compliance(const ConstraintContext<Scalar>& context, Index v) noexcept {
     const auto& contacts = context.contacts();
-    const Scalar stiffness = contacts.support_stiffness(v), part = opposed_part(context, v);
+    const Scalar stiffness = contacts.support_stiffness(v);
     const bool held = context.fixed(v) || contacts.pressed_supports.contains(v);
-    return held && stiffness > 0 ? part * part / stiffness : Scalar(0);
+    if (!held || !(stiffness > 0)) return 0;
+    const Scalar part = opposed_part(context, v);
+    return part * part / stiffness;
 }
 
 /// Vertices shared with the constraint, or beside fixed ones, may move by `distance` in this step [m]: the motion of a
