@@ -139,7 +139,7 @@ void packs(benchmark::State& state) {
     for (auto _ : state) {
         for (std::size_t p = 0, end = 0; p < packed.count(); p = end) {
             end = packed.end_of_group(p, packed.count());
-            packed.template update<false>(p, end, scene, Rule{}, false, membrane::OneThread{});
+            packed.update(p, end, scene, Rule{}, membrane::Constrained::no, membrane::OneThread{});
             benchmark::DoNotOptimize(end);
         }
     }

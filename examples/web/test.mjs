@@ -216,9 +216,13 @@ async function testChoice(page) {
     const holds = /keeps the error/.test(text) && found <= parseFloat(button);
     check(`layers and sweeps for ${button}`, holds, `${await dials()}: ${text}`);
   }
-  const work = async (button) => (await chosen(button), (await dials()).reduce((a, b) => a * b));
-  const [little, much] = [await work("40 µs"), await work("80 µs")];
-  check("more layers and sweeps for more time", little <= much, `${little}, ${much}`);
+  for (const button of ["40 µs", "80 µs"]) {
+    const text = await chosen(button); // which setting it is depends on what else runs on this machine
+    const time = Number(text.match(/ and (\d+) µs/)[1]);
+    const keeps = /keeps the time/.test(text);
+    const holds = keeps ? time <= parseFloat(button) : /comes closest/.test(text) && time >= parseFloat(button);
+    check(`layers and sweeps for ${button}`, holds, `${await dials()}: ${text}`);
+  }
 }
 
 async function testFiles() {

@@ -80,7 +80,7 @@ template <class Scene>
 [[gnu::always_inline]] inline void update_all(Packed& packed, const Scene& scene) noexcept {
     for (std::size_t p = 0, end = 0; p < packed.count(); p = end) {
         end = packed.end_of_group(p, packed.count());
-        packed.update<false>(p, end, scene, Rule{}, false, membrane::OneThread());
+        packed.update(p, end, scene, Rule{}, membrane::Constrained::no, membrane::OneThread());
     }
 }
 

@@ -125,8 +125,8 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", TEST_S
         static_assert(noexcept(packed.vertices(0))&& noexcept(packed.first_of(0))&& noexcept(packed.pack_from(0)));
         static_assert(noexcept(packed.begin_step(scene))&& noexcept(packed.evaluate_residual(0, scene)));
         static_assert(noexcept(packed.extend(queue.vertices(), 0, queue.colour_ends(), network)));
-        static_assert(noexcept(packed.template update<true>(0, 1, scene, SafeStep{}, false, executor)));
-        static_assert(noexcept(packed.template update<false>(0, 1, scene, BlockStep{}, true, executor)));
+        static_assert(noexcept(packed.update(0, 1, scene, SafeStep{}, Constrained::in_contact, executor)));
+        static_assert(noexcept(packed.update(0, 1, scene, BlockStep{}, Constrained::no, executor)));
         static_assert(noexcept(packed.free_count(0))&& noexcept(packed.needed()));
     });
     static_cast<void>([](VertexRows<S>& rows, ContactState<S>& contacts, const ContactTool<S>& tool,

@@ -164,8 +164,8 @@ void check_alone(const Law& law, const Rule& rule) {
         packed.begin_step(scene);
         for (std::size_t p = 0, end = 0; p < packed.count(); p = end) {
             end = packed.end_of_group(p, packed.count());
-            in_contact ? packed.template update<true>(p, end, scene, rule, false, OneThread())
-                       : packed.template update<false>(p, end, scene, rule, true, OneThread());
+            const auto constrained = in_contact ? Constrained::in_contact : Constrained::by_force;
+            packed.update(p, end, scene, rule, constrained, OneThread());
         }
         for (const Index v : queue.vertices()) moved += test::update(alone, v, rule, rows.force_tolerance);
         for (Index v = 0; v < vertices; ++v) REQUIRE(rows.position_of(v) == other.position_of(v));

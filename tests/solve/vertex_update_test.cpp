@@ -74,7 +74,7 @@ Vector3<double> displacement_by(Step& step, const Rule& rule) {
     const std::array<std::size_t, 1> end{1};
     packed.assign({&step.v, 1}, end, step.network);
     packed.begin_step(step.scene);
-    packed.template update<false>(0, 1, step.scene, rule, true, OneThread());
+    packed.update(0, 1, step.scene, rule, Constrained::by_force, OneThread());
     const Vector3<double> by = step.rows.position_of(step.v) - point(step.x, step.v);
     step.rows.set_position(step.v, point(step.x, step.v));
     return by;

@@ -110,7 +110,7 @@ class ConstPointsRef : public Eigen::Ref<const Points<Scalar>, 0, Eigen::OuterSt
 
 /// Point `v` of `x`, by value. Reads number by number: compilers generate better code than for a column.
 template <class Positions>
-[[nodiscard]] auto point(const Positions& x, Index v) noexcept {
+[[nodiscard]] MEMBRANE_INLINE auto point(const Positions& x, Index v) noexcept {
     return Vector3<typename Positions::Scalar>(x(0, v), x(1, v), x(2, v));
 }
 

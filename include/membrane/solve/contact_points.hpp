@@ -213,8 +213,8 @@ inline constexpr int corners_at_once = 2;
 /// stiffness: along the total force on a corner; beside fixed or shared corners in all directions. There a point may
 /// press hard with little weight on its free corners, and other points set the direction of the total force on them.
 template <Real Scalar>
-MEMBRANE_INLINE void add_forces(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
-                                ContactPack<Scalar>& pack) noexcept {
+MEMBRANE_NOINLINE MEMBRANE_FLATTEN void add_forces(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
+                                                   ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     const auto &load = pack.load, &applied = pack.applied;
     each_corner([&](std::size_t k) {
@@ -252,7 +252,7 @@ template <Real Scalar>
                                                const ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     SupportOfPack<Scalar> sum;
-    for (std::size_t k = 0; pack.on_fixed && k < 3; ++k) {
+    for (std::size_t k = 0; k < 3; ++k) {
         const auto i = static_cast<Eigen::Index>(k);
         const auto support = gather_padded(contacts.support.data(), pack.corner[k].data());
         const auto others = gather_padded(contacts.opposing.data(), pack.corner[k].data());
@@ -273,37 +273,53 @@ template <Real Scalar>
     return sum;
 }
 
-/// Gap between the tool and the points of a pack, along their normals, with the displacement of fixed corners [m].
-template <Real Scalar>
-[[nodiscard]] MEMBRANE_INLINE Lanes<Scalar> gap_of(const ContactTool<Scalar>& tool, const ContactPack<Scalar>& pack,
-                                                   const SupportOfPack<Scalar>& support) noexcept {
-    return pack.distance - support.displacement - tool.radius;
-}
-
-/// A negligible gap: the response to a negligible force, or a few roundings [m].
-template <Real Scalar>
-[[nodiscard]] MEMBRANE_INLINE Lanes<Scalar> gap_tolerance(const VertexRows<Scalar>& rows,
-                                                          const std::array<PaddedLanes<Scalar>, 3>& corner,
-                                                          const ContactPack<Scalar>& pack,
-                                                          const SupportOfPack<Scalar>& support) noexcept {
-    using Wide = Lanes<Scalar>;
-    Wide sum = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-        const Wide& weight = pack.load.weights[static_cast<Eigen::Index>(k)];
-        const Wide& compliance = corner[k].extra;
-        sum += weight * weight * compliance;
-    }
-    const Wide rounding = 2 * std::numeric_limits<Scalar>::epsilon() * largest_magnitude<Wide>(corner[0].point);
-    const Wide tolerance = rows.force_tolerance;
-    return larger<Wide>(tolerance * sum, rounding) + tolerance * support.compliance;
-}
-
 template <Real Scalar>
 [[nodiscard]] MEMBRANE_INLINE std::array<PaddedLanes<Scalar>, 3> corners_of(const VertexRows<Scalar>& rows,
                                                                             const ContactPack<Scalar>& pack) noexcept {
     return {gather_padded(rows.position.data(), pack.corner[0].data()),
             gather_padded(rows.position.data(), pack.corner[1].data()),
             gather_padded(rows.position.data(), pack.corner[2].data())};
+}
+
+/// The points of a pack at the current positions.
+template <Real Scalar>
+struct LocatedPack {
+    std::array<PaddedLanes<Scalar>, 3> corner;
+    SupportOfPack<Scalar> support;
+    Lanes<Scalar> gap;  // to the tool along the normals, with the displacement of fixed corners [m]
+};
+
+/// Locates the points of a pack; fixed corners respond to the forces so far.
+template <Real Scalar>
+[[nodiscard]] MEMBRANE_NOINLINE MEMBRANE_FLATTEN LocatedPack<Scalar> located(VertexRows<Scalar>& rows,
+                                                                             ContactState<Scalar>& contacts,
+                                                                             const ContactTool<Scalar>& tool,
+                                                                             ContactPack<Scalar>& pack) noexcept {
+    LocatedPack<Scalar> now{corners_of(rows, pack), {}, 0};
+    locate(tool, now.corner, pack);
+    if (pack.on_fixed) {
+        add_forces(rows, contacts, pack);
+        now.support = support_of(contacts, pack);
+    }
+    now.gap = pack.distance - now.support.displacement - tool.radius;
+    return now;
+}
+
+/// A negligible gap: the response to a negligible force, or a few roundings [m].
+template <Real Scalar>
+[[nodiscard]] MEMBRANE_INLINE Lanes<Scalar> gap_tolerance(const VertexRows<Scalar>& rows,
+                                                          const LocatedPack<Scalar>& now,
+                                                          const ContactPack<Scalar>& pack) noexcept {
+    using Wide = Lanes<Scalar>;
+    Wide sum = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Wide& weight = pack.load.weights[static_cast<Eigen::Index>(k)];
+        const Wide& compliance = now.corner[k].extra;
+        sum += weight * weight * compliance;
+    }
+    const Wide rounding = 2 * std::numeric_limits<Scalar>::epsilon() * largest_magnitude<Wide>(now.corner[0].point);
+    const Wide tolerance = rows.force_tolerance;
+    return larger<Wide>(tolerance * sum, rounding) + tolerance * now.support.compliance;
 }
 
 /// Response of the corners of a pack to a unit force along the normal, and the internal force and stiffness there.
@@ -344,10 +360,10 @@ template <Real Scalar>
 /// their response. Returns the absolute change [N].
 template <Real Scalar>
 MEMBRANE_INLINE Lanes<Scalar> solve(VertexRows<Scalar>& rows, const typename Lanes<Scalar>::Mask& acts,
-                                    const Lanes<Scalar>& gap, const Lanes<Scalar>& tolerance,
-                                    const PackResponse<Scalar>& response, std::array<PaddedLanes<Scalar>, 3>& corner,
+                                    const PackResponse<Scalar>& response, LocatedPack<Scalar>& now,
                                     ContactPack<Scalar>& pack, ContactPass<Scalar>& pass) noexcept {
     using Wide = Lanes<Scalar>;
+    const Wide& gap = now.gap;
     const auto moves = acts & (response.compliance > 0);
     const Wide divisor = select<Wide>(moves, response.compliance, 1);
     Wide change = larger<Wide>(-gap / divisor, -pack.load.force);
@@ -360,7 +376,7 @@ MEMBRANE_INLINE Lanes<Scalar> solve(VertexRows<Scalar>& rows, const typename Lan
     const auto too_hard = moves & (pack.load.force + change > limit);
     change = select<Wide>(too_hard, -pack.load.force, change);
     pass.released = pass.released || any(too_hard);
-    const auto counts = moves & (abs(change) * response.compliance > tolerance);
+    const auto counts = moves & (abs(change) * response.compliance > gap_tolerance(rows, now, pack));
     if (!any(counts)) return 0;
     change = select<Wide>(counts, change, 0);
     pack.change = change;
@@ -368,8 +384,8 @@ MEMBRANE_INLINE Lanes<Scalar> solve(VertexRows<Scalar>& rows, const typename Lan
     // So large a change has no linear response: the next updates of the corners follow a release.
     const Wide linear = select<Wide>(too_hard, 0, change);
     each_corner([&](std::size_t k) {
-        corner[k].point -= linear * response.of_corner[k];
-        scatter_padded(corner[k], rows.position.data(), pack.corner[k].data());
+        now.corner[k].point -= linear * response.of_corner[k];
+        scatter_padded(now.corner[k], rows.position.data(), pack.corner[k].data());
     });
     return abs(change);
 }
@@ -384,25 +400,21 @@ template <Real Scalar>
 }  // namespace detail
 
 template <Real Scalar>
-MEMBRANE_FLATTEN bool push_out(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
-                               const ContactTool<Scalar>& tool, std::span<ContactPack<Scalar>> packs) noexcept {
+bool push_out(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts, const ContactTool<Scalar>& tool,
+              std::span<ContactPack<Scalar>> packs) noexcept {
     using Wide = Lanes<Scalar>;
     bool moved = false;
     for (auto& pack : packs) {
-        auto corner = detail::corners_of(rows, pack);
-        detail::locate(tool, corner, pack);
-        if (pack.on_fixed) detail::add_forces(rows, contacts, pack);  // fixed corners respond to the forces so far
-        const auto support = detail::support_of(contacts, pack);
-        const Wide gap = detail::gap_of(tool, pack, support);
-        const auto inside = (pack.used > 0) & (-gap > detail::gap_tolerance(rows, corner, pack, support));
+        auto now = detail::located(rows, contacts, tool, pack);
+        const auto inside = (pack.used > 0) & (-now.gap > detail::gap_tolerance(rows, now, pack));
         if (!any(inside)) continue;
         moved = true;
-        const Wide part = select<Wide>(inside, gap / squared_norm(pack.load.weights), 0);
-        for (std::size_t k = 0; k < 3; ++k) {
+        const Wide part = select<Wide>(inside, now.gap / squared_norm(pack.load.weights), 0);
+        detail::each_corner([&](std::size_t k) {
             const auto i = static_cast<Eigen::Index>(k);
-            corner[k].point += (part * pack.load.weights[i] * pack.free[i]) * pack.load.normal;
-            scatter_padded(corner[k], rows.position.data(), pack.corner[k].data());
-        }
+            now.corner[k].point += (part * pack.load.weights[i] * pack.free[i]) * pack.load.normal;
+            scatter_padded(now.corner[k], rows.position.data(), pack.corner[k].data());
+        });
     }
     return moved;
 }
@@ -416,20 +428,15 @@ MEMBRANE_FLATTEN ContactPass<Scalar> solve_contacts(VertexRows<Scalar>& rows, Co
     Wide largest = 0;
     for (auto& pack : packs) {
         if (again && !pack.acts) continue;
-        auto corner = detail::corners_of(rows, pack);
-        detail::locate(tool, corner, pack);
-        if (pack.on_fixed) detail::add_forces(rows, contacts, pack);  // fixed corners respond to the forces so far
-        const auto support = detail::support_of(contacts, pack);
-        const Wide gap = detail::gap_of(tool, pack, support);
-        const auto acts = (pack.used > 0) & ((pack.load.force > 0) | (gap < 0));
+        auto now = detail::located(rows, contacts, tool, pack);
+        const auto acts = (pack.used > 0) & ((pack.load.force > 0) | (now.gap < 0));
         pack.acts = any(acts);
         if (!pack.acts) continue;
         const auto allowed = static_cast<Scalar>(deep_overlap * deep_overlap);
-        const Wide edge_square = squared_norm<Wide>(corner[1].point - corner[0].point);
-        pass.deep = pass.deep || any((pack.used > 0) & (gap < 0) & (gap * gap > allowed * edge_square));
-        const auto response = detail::response_of(rows, support, pack);
-        const Wide tolerance = detail::gap_tolerance(rows, corner, pack, support);
-        largest = larger<Wide>(largest, detail::solve(rows, acts, gap, tolerance, response, corner, pack, pass));
+        const Wide edge_square = squared_norm<Wide>(now.corner[1].point - now.corner[0].point);
+        pass.deep = pass.deep || any((pack.used > 0) & (now.gap < 0) & (now.gap * now.gap > allowed * edge_square));
+        const auto response = detail::response_of(rows, now.support, pack);
+        largest = larger<Wide>(largest, detail::solve(rows, acts, response, now, pack, pass));
         if (pack.on_fixed) detail::add_forces(rows, contacts, pack);
     }
     pass.largest = detail::largest_of(largest);
@@ -445,11 +452,12 @@ MEMBRANE_FLATTEN void apply_forces(VertexRows<Scalar>& rows, ContactState<Scalar
             const auto corner = detail::corners_of(rows, pack);
             load.stiffness = detail::rocking_stiffness<Lanes<Scalar>>(
                 {corner[0].point, corner[1].point, corner[2].point}, load.weights, load.force * abs(pack.distance));
-            detail::add_forces(rows, contacts, pack);
         } else if (any(pack.applied.force > 0)) {
             load.stiffness = Vector3<Lanes<Scalar>>::Zero();
-            detail::add_forces(rows, contacts, pack);
+        } else {
+            continue;
         }
+        detail::add_forces(rows, contacts, pack);
     }
 }
 

@@ -25,11 +25,18 @@
 ///     packed.begin_step(scene);
 ///     for (std::size_t p = 0, end; p < packed.count(); p = end) {
 ///         end = packed.end_of_group(p, packed.count());
-///         packed.update<false>(p, end, scene, rule, membrane::OneThread());
+///         packed.update(p, end, scene, rule, membrane::Constrained::no, membrane::OneThread());
 ///     }
 namespace membrane {
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
+
+/// What constraints are to the vertices of an update.
+enum class Constrained : unsigned char {
+    no,          ///< they have no force on them
+    by_force,    ///< their forces are added
+    in_contact,  ///< as vertices of layer 0: their forces are added, and the response of each vertex is stored for them
+};
 
 /// The vertices of a queue, and then others, in packs of one vertex for each lane. A pack stores for each vertex its
 /// springs, its volume spring and whether it is free. The vertices are in groups, colour classes: no spring joins two
@@ -110,20 +117,18 @@ class PackedVertices {
         unstable,  ///< updates of a vertex diverge: nothing moved
     };
 
-    /// Updates the vertices of packs `begin` to `end`, the end excluded, all of one group, by `rule`. With
-    /// `in_contact`, adds the forces of constraints and stores the compliance of each vertex; if `forced`, adds these
-    /// forces in any case. The packs are divided among threads; a thread interleaves two packs, which hides the latency
-    /// of roots and divisions.
-    template <bool in_contact, class Scene, class Rule, Executor E>
-    void update(std::size_t begin, std::size_t end, const Scene& scene, const Rule& rule, bool forced,
+    /// Updates the vertices of packs `begin` to `end`, the end excluded, all of one group, by `rule`. The packs are
+    /// divided among threads; a thread interleaves two packs, which hides the latency of roots and divisions.
+    template <class Scene, class Rule, Executor E>
+    void update(std::size_t begin, std::size_t end, const Scene& scene, const Rule& rule, Constrained constrained,
                 const E& executor) noexcept {
         constexpr std::size_t packs_in_task = 32;
         parallel_for(executor, end - begin, packs_in_task, [&](std::size_t first, std::size_t last) {
             std::size_t p = begin + first;
             if constexpr (!HasElements<NetworkOf<Scene>>) {
-                for (; p + 1 < begin + last; p += 2) update_two<in_contact>(p, scene, rule, forced);
+                for (; p + 1 < begin + last; p += 2) update_two(p, scene, rule, constrained);
             }
-            for (; p < begin + last; ++p) outcomes_[p] = update_pack<in_contact>(p, scene, rule, forced);
+            for (; p < begin + last; ++p) outcomes_[p] = update_pack(p, scene, rule, constrained);
         });
     }
     /// Outcome of the last `update` for pack `p`.
@@ -186,18 +191,25 @@ class PackedVertices {
     [[nodiscard]] Sum springs_on(std::size_t p, const Vector3<Wide>& here, const Scene& scene) const noexcept;
     // State of a pack before its update.
     struct PackState {
-        Vector3<Wide> here, constraint_force;
-        Wide added_stiffness;
+        Vector3<Wide> here;
         VertexState<Wide> vertex;
         VertexForce<Wide> others;
     };
-    template <bool in_contact, class Rule, class Scene>
-    [[nodiscard]] PackState evaluate(std::size_t p, const Scene& scene, bool forced) const noexcept;
-    template <bool in_contact, class Scene, class Rule>
-    Outcome update_pack(std::size_t p, const Scene& scene, const Rule& rule, bool forced) noexcept;
-    template <bool in_contact, class Scene, class Rule>
-    void update_two(std::size_t p, const Scene& scene, const Rule& rule, bool forced) noexcept;
-    template <bool in_contact, class Scene, class Rule>
+    template <class Rule, class Scene>
+    [[nodiscard]] PackState evaluate(std::size_t p, const Scene& scene, Constrained constrained) const noexcept;
+    template <class Scene, class Rule>
+    MEMBRANE_FLATTEN Outcome update_pack(std::size_t p, const Scene& scene, const Rule& rule,
+                                         Constrained constrained) noexcept {
+        return move(p, evaluate<Rule>(p, scene, constrained), scene, rule);
+    }
+    template <class Scene, class Rule>
+    MEMBRANE_FLATTEN void update_two(std::size_t p, const Scene& scene, const Rule& rule,
+                                     Constrained constrained) noexcept {
+        const auto state = evaluate<Rule>(p, scene, constrained), next = evaluate<Rule>(p + 1, scene, constrained);
+        outcomes_[p] = move(p, state, scene, rule);
+        outcomes_[p + 1] = move(p + 1, next, scene, rule);
+    }
+    template <class Scene, class Rule>
     Outcome move(std::size_t p, const PackState& at, const Scene& scene, const Rule& rule) noexcept;
     template <class Rule, class Scene>
     [[nodiscard]] VertexState<Wide> spring_state(std::size_t p, const Vector3<Wide>& here,
@@ -213,6 +225,10 @@ class PackedVertices {
     [[nodiscard]] VertexForce<Wide> foundation_on(std::size_t p, const Vector3<Wide>& here,
                                                   const Scene& scene) const noexcept;
 
+    [[nodiscard]] Wide added_stiffness(std::size_t p, const VertexRows<Scalar>& rows) const noexcept {
+        return Wide::of(
+            [&](std::size_t i) { return rows.added_stiffness[static_cast<std::size_t>(row_at(packs_[p].own[i]))]; });
+    }
     void keep_response(std::size_t p, const PackState& at, const Symmetric3<Wide>& block,
                        VertexRows<Scalar>& rows) const noexcept;
 
@@ -421,8 +437,9 @@ MEMBRANE_INLINE void PackedVertices<Scalar>::keep_response(std::size_t p, const 
                                                            VertexRows<Scalar>& rows) const noexcept {
     const auto may_move = terms_[p].free != 0;
     const auto kept = [&](const Wide& number) { return select<Wide>(may_move, number, 0); };
-    const Wide internal_force = norm<Wide>(at.vertex.force - at.constraint_force);
-    const Wide internal_stiffness = at.vertex.stiffness - at.vertex.contact_stiffness - at.added_stiffness;
+    const Vector3<Wide> constraint_force = gather(rows.force.data(), packs_[p].own.data());
+    const Wide internal_force = norm<Wide>(at.vertex.force - constraint_force);
+    const Wide internal_stiffness = at.vertex.stiffness - at.vertex.contact_stiffness - added_stiffness(p, rows);
     rows.set_responses(packs_[p].own, {{kept(block.xx), kept(block.yy), kept(block.zz), kept(block.xy), kept(block.xz),
                                         kept(block.yz)},
                                        kept(internal_force),
@@ -431,9 +448,9 @@ MEMBRANE_INLINE void PackedVertices<Scalar>::keep_response(std::size_t p, const 
 
 // Evaluates the forces on the vertices of a pack.
 template <Real Scalar>
-template <bool in_contact, class Rule, class Scene>
-MEMBRANE_INLINE auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene& scene, bool forced) const noexcept
-    -> PackState {
+template <class Rule, class Scene>
+MEMBRANE_INLINE auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene& scene,
+                                                      Constrained constrained) const noexcept -> PackState {
     VertexRows<Scalar>& rows = scene.rows;
     const auto& own = packs_[p].own;
     PackState at;
@@ -447,35 +464,32 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene
         add(static_cast<EnergyMajoriser<Wide>&>(at.vertex), elements);
     }
     if constexpr (!std::same_as<VolumeOf<Scene>, NoFoundation>) at.others = foundation_on(p, at.here, scene);
-    if (in_contact || forced) {
+    if (constrained != Constrained::no) {
         const auto of_constraints = gather_padded(rows.force.data(), own.data());
         const Wide contact_stiffness = larger<Wide>(of_constraints.extra, 0);
-        at.constraint_force = of_constraints.point;
-        at.added_stiffness =
-            Wide::of([&](std::size_t i) { return rows.added_stiffness[static_cast<std::size_t>(row_at(own[i]))]; });
-        at.others.force += at.constraint_force;
-        at.others.stiffness += contact_stiffness + at.added_stiffness;
-        if constexpr (in_contact) {
+        at.others.force += of_constraints.point;
+        at.others.stiffness += contact_stiffness + added_stiffness(p, rows);
+        if (constrained == Constrained::in_contact) {
             at.vertex.contact_stiffness = contact_stiffness;
-            at.vertex.contact_normal = direction_or_zero<Wide>(at.constraint_force);
+            at.vertex.contact_normal = direction_or_zero<Wide>(of_constraints.point);
         }
     }
     at.vertex.force += at.others.force;
     at.vertex.stiffness += at.others.stiffness;
     at.vertex.mass = terms_[p].mass;
     at.vertex.dt = scene.dt;
-    at.vertex.constrained = in_contact;
+    at.vertex.constrained = constrained == Constrained::in_contact;
     return at;
 }
 
 template <Real Scalar>
-template <bool in_contact, class Scene, class Rule>
+template <class Scene, class Rule>
 MEMBRANE_INLINE auto PackedVertices<Scalar>::move(std::size_t p, const PackState& at, const Scene& scene,
                                                   const Rule& rule) noexcept -> Outcome {
     VertexRows<Scalar>& rows = scene.rows;
     const auto& own = packs_[p].own;
     const auto may_move = terms_[p].free != 0;
-    const bool in_queue = in_contact || p < assigned_.packs;
+    const bool in_queue = at.vertex.constrained || p < assigned_.packs;
     const auto move = move_of(rule, at.vertex, in_queue ? rows.force_tolerance : rows.outside_tolerance());
     if constexpr (moves_along_force<Rule, Scalar> && !is_descent_rule<Rule>) {
         if (any(move.may_overshoot & may_move)) {
@@ -485,7 +499,7 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::move(std::size_t p, const PackState
             }
         }
     }
-    if constexpr (in_contact) keep_response(p, at, as_block<Wide>(move.compliance), rows);
+    if (at.vertex.constrained) keep_response(p, at, as_block<Wide>(move.compliance), rows);
     const auto moves = move.moves & may_move;
     Vector3<Wide> displacement = move.displacement;
     if constexpr (needs_line_search<Rule, NetworkOf<Scene>>) {
@@ -535,24 +549,6 @@ auto PackedVertices<Scalar>::energy_change(std::size_t p, const Vector3<Wide>& h
         sum += element.energy_change(x, i, displacement);
     });
     return sum;
-}
-
-template <Real Scalar>
-template <bool in_contact, class Scene, class Rule>
-MEMBRANE_FLATTEN auto PackedVertices<Scalar>::update_pack(std::size_t p, const Scene& scene, const Rule& rule,
-                                                          bool forced) noexcept -> Outcome {
-    return move<in_contact>(p, evaluate<in_contact, Rule>(p, scene, forced), scene, rule);
-}
-
-// Pack `p` and the next one of its group.
-template <Real Scalar>
-template <bool in_contact, class Scene, class Rule>
-MEMBRANE_FLATTEN void PackedVertices<Scalar>::update_two(std::size_t p, const Scene& scene, const Rule& rule,
-                                                         bool forced) noexcept {
-    const auto state = evaluate<in_contact, Rule>(p, scene, forced);
-    const auto next = evaluate<in_contact, Rule>(p + 1, scene, forced);
-    outcomes_[p] = move<in_contact>(p, state, scene, rule);
-    outcomes_[p + 1] = move<in_contact>(p + 1, next, scene, rule);
 }
 
 template <Real Scalar>

@@ -183,8 +183,9 @@ class QuasiStaticSolver {
     bool update_until_time_is_up(const Scene& scene, std::size_t begin, std::size_t end) noexcept;
     template <class Scene>
     std::size_t pack_spare(const Scene& scene, std::size_t begin, std::size_t end) noexcept;
-    template <bool in_contact, class Scene>
-    bool update_packs(const Scene& scene, PackedVertices<Scalar>& packs, std::size_t p, std::size_t end) noexcept;
+    template <class Scene>
+    bool update_packs(const Scene& scene, PackedVertices<Scalar>& packs, std::size_t p, std::size_t end,
+                      Constrained constrained) noexcept;
     template <class Scene>
     [[nodiscard]] bool evaluate_residuals(const Scene& scene) noexcept;
     template <class Network>
@@ -545,10 +546,10 @@ bool QuasiStaticSolver<Scalar, Rule>::iterate_contact(const Scene& scene,
             break;
         }
         const std::size_t packed_count = (std::min)(layer.size(), progress_.in_packs);
-        changed |= update_packs<true>(scene, packed_, 0, packed_.pack_from(packed_count));
+        changed |= update_packs(scene, packed_, 0, packed_.pack_from(packed_count), Constrained::in_contact);
         for (std::size_t begin = packed_count, end; begin < layer.size(); begin = end) {
             end = pack_spare(scene, begin, layer.size());
-            changed |= update_packs<true>(scene, spare_, 0, spare_.count());
+            changed |= update_packs(scene, spare_, 0, spare_.count(), Constrained::in_contact);
         }
         progress_.budget.updated(layer.size());
         if (!advances()) break;
@@ -612,10 +613,11 @@ template <class Scene>
 bool QuasiStaticSolver<Scalar, Rule>::update_until_time_is_up(const Scene& scene, std::size_t begin,
                                                               std::size_t end) noexcept {
     const std::size_t packed_end = std::clamp(progress_.in_packs, begin, end), last = packed_.pack_from(packed_end);
+    const auto constrained = progress_.forced_beyond ? Constrained::by_force : Constrained::no;
     bool changed = false;
     const auto update = [&](PackedVertices<Scalar>& packs, std::size_t p, std::size_t next) {
         const Index before = report_.vertex_updates;
-        changed |= update_packs<false>(scene, packs, p, next);
+        changed |= update_packs(scene, packs, p, next, constrained);
         progress_.budget.updated(static_cast<std::size_t>(report_.vertex_updates - before));
     };
     for (std::size_t p = packed_.pack_from(begin), next; p < last && goes_on(packed_.first_of(p)); p = next) {
@@ -658,15 +660,15 @@ bool QuasiStaticSolver<Scalar, Rule>::goes_on(std::size_t i) noexcept {
 
 // No spring joins the packs of a group: threads may share them. Under a deadline batches are too small to distribute.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
-template <bool in_contact, class Scene>
+template <class Scene>
 bool QuasiStaticSolver<Scalar, Rule>::update_packs(const Scene& scene, PackedVertices<Scalar>& packs, std::size_t p,
-                                                   std::size_t end) noexcept {
+                                                   std::size_t end, Constrained constrained) noexcept {
     bool changed = false;
     const AnyExecutor calling_thread;
     const AnyExecutor& distributor = progress_.budget.limited() ? calling_thread : executor_;
     while (p < end && advances()) {
         const std::size_t group_end = packs.end_of_group(p, end);
-        packs.template update<in_contact>(p, group_end, scene, rule_, progress_.forced_beyond, distributor);
+        packs.update(p, group_end, scene, rule_, constrained, distributor);
         for (; p < group_end && advances(); ++p) {
             using Outcome = typename PackedVertices<Scalar>::Outcome;
             report_.vertex_updates += packs.free_count(p);

@@ -14,9 +14,8 @@
 /// One vertex update: the displacement of a vertex by the rule for the forces on it. One code serves one vertex and
 /// several.
 ///
-///     auto state = membrane::state_of<Rule>(scene, v);
-///     const auto move = membrane::move_of(rule, state, scene.rows.force_tolerance);
-///     if (move.moves) x.col(v) += membrane::backtracked<Rule>(scene, v, state, move.displacement);
+///     const auto move = membrane::move_of(rule, vertex, rows.force_tolerance);
+///     if (move.moves) position += move.displacement;
 namespace membrane {
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
