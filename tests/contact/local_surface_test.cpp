@@ -96,7 +96,8 @@ TEST_CASE("nearest to a tool: a point for a sphere, along the axis for a capsule
     const membrane::Tool<double> capsule{.position = {0.1, 0.2, 0.3}, .axis = {0.05, 0.05, -0.2}};
     double nearest_sphere = 1, nearest_capsule = 1;
     for (Index f = 0; f < mesh.triangle_count(); ++f) {
-        const auto a = surface.nearest(mesh.positions(), f, sphere), b = surface.nearest(mesh.positions(), f, capsule);
+        const auto a = closest_to_axis(surface.triangle(mesh.positions(), f), sphere),
+                   b = closest_to_axis(surface.triangle(mesh.positions(), f), capsule);
         nearest_sphere = std::min(nearest_sphere, std::sqrt(a.on_triangle.squared_distance));
         nearest_capsule = std::min(nearest_capsule, std::sqrt(b.on_triangle.squared_distance));
     }

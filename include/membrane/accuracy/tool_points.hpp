@@ -49,9 +49,7 @@ struct ToolPoint : ContactPoint<double> {
 
 /// Distance of the triangle from the tool's axis [m].
 [[nodiscard]] inline double distance_from_axis(const Triangle<double>& triangle, const Tool<double>& tool) noexcept {
-    if (!is_shaft(tool)) return std::sqrt(closest_point(triangle, tool.position).squared_distance);
-    const Vector3<double> end = tool.position + tool.axis;
-    return std::sqrt(closest_to_segment(triangle, tool.position, end).on_triangle.squared_distance);
+    return std::sqrt(closest_to_axis(triangle, tool).on_triangle.squared_distance);
 }
 
 /// The largest part, up to 1, of a `step` (3 x V [m]) in which no triangle can reach the axis of a tool: no corner

@@ -147,11 +147,10 @@ inline void ContactBounds::assign(const EquilibriumProblem& problem, const Trian
 // u is off by rounding.
 inline void ContactBounds::find_near(std::size_t i, const Triangles& triangles, const Points<double>& y,
                                      const Tool<double>& tool) {
-    const Vector3<double> end = tool.position + tool.axis;
     for (const auto& corners : triangles.colwise()) {
         const auto triangle = triangle_at(y, corners);
         if (detail::is_far(triangle, tool, 1.25 * tool.radius)) continue;
-        const auto nearest = closest_to_segment(triangle, tool.position, end);
+        const auto nearest = closest_to_axis(triangle, tool);
         const Vector3<double> separation = nearest.on_triangle.point - tool.position - nearest.fraction * tool.axis;
         const Vector3<double> u = direction<double>(separation, Vector3<double>::Zero());
         const Wide wide_u = wide(u), axis = wide(tool.axis);

@@ -30,7 +30,7 @@ template <Real Scalar>
 Contact<Scalar> contact_in(const LocalSurface<Scalar>& surface, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                            Index f, const Tool<Scalar>& tool, Scalar radius, Scalar side) noexcept {
     const auto triangle = surface.triangle(x, f);
-    auto nearest = surface.nearest(x, f, tool);
+    auto nearest = closest_to_axis(triangle, tool);
     Contact<Scalar> contact;
     contact.side = side;
     contact.axis_point = tool.position + nearest.fraction * tool.axis;

@@ -143,7 +143,8 @@ class ContactTracker : public SplitCount {
     }
     // Whether a shaft passes through triangle `f`.
     [[nodiscard]] bool pierces(const Scene& scene, Index f) const noexcept {
-        return is_shaft(scene.tool) && surface_.nearest(scene.x, f, scene.tool).on_triangle.squared_distance == 0;
+        return is_shaft(scene.tool) &&
+               closest_to_axis(surface_.triangle(scene.x, f), scene.tool).on_triangle.squared_distance == 0;
     }
     [[nodiscard]] bool was_behind(const Scene& scene, Index f, Scalar side, const Vector3<Scalar>& q) const noexcept;
     [[nodiscard]] std::optional<Vector3<Scalar>> middle_inside(const Scene& scene, Index f, Scalar side) const noexcept;
@@ -819,7 +820,7 @@ bool ContactTracker<Scalar>::leaves_border(const Scene& scene, const Contact<Sca
 template <Real Scalar>
 bool ContactTracker<Scalar>::is_hooked(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
     const auto overlapped = [&](Index f) {
-        const auto before = surface_.nearest(scene.anchors, f, scene.tool).on_triangle;
+        const auto before = closest_to_axis(surface_.triangle(scene.anchors, f), scene.tool).on_triangle;
         return before.squared_distance < scene.radius * scene.radius;
     };
     // A shaft may be inside between the points where its depth is measured.

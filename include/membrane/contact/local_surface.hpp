@@ -90,15 +90,11 @@ class LocalSurface {
     /// Signed distance of `q` from its nearest point of triangle `f`, negative behind the surface [m].
     [[nodiscard]] Scalar height(const ConstPointsRef<Scalar>& x, Index f, const Vector3<Scalar>& q) const noexcept;
 
-    /// The nearest points of triangle `f` and the tool's axis.
-    [[nodiscard]] SegmentPair<Scalar> nearest(const ConstPointsRef<Scalar>& x, Index f,
-                                              const Tool<Scalar>& tool) const noexcept;
-
     using Wide = std::array<Index, Lanes<Scalar>::count>;  ///< triangles
 
     ///@{
     /// In lane i the squared distance of triangle `some[i]` from `q`, or from the tool's axis [m^2]. Equals the results
-    /// of `closest_point` and `nearest` bit for bit.
+    /// of `closest_point` and `closest_to_axis` bit for bit.
     [[nodiscard]] Lanes<Scalar> squared_distances(const ConstPointsRef<Scalar>& x, const Wide& some,
                                                   const Vector3<Scalar>& q) const noexcept;
     [[nodiscard]] Lanes<Scalar> squared_distances(const ConstPointsRef<Scalar>& x, const Wide& some,
@@ -221,13 +217,6 @@ Scalar LocalSurface<Scalar>::height(const ConstPointsRef<Scalar>& x, Index f, co
 }
 
 template <Real Scalar>
-SegmentPair<Scalar> LocalSurface<Scalar>::nearest(const ConstPointsRef<Scalar>& x, Index f,
-                                                  const Tool<Scalar>& tool) const noexcept {
-    if (!is_shaft(tool)) return {0, closest_point(triangle(x, f), tool.position)};
-    return closest_to_segment<Scalar>(triangle(x, f), tool.position, tool.position + tool.axis);
-}
-
-template <Real Scalar>
 Triangle<Lanes<Scalar>> LocalSurface<Scalar>::gather(const ConstPointsRef<Scalar>& x, const Wide& some) const noexcept {
     const auto corner = [&](Eigen::Index k) {
         std::array<const Scalar*, Lanes<Scalar>::count> p;
@@ -259,7 +248,8 @@ template <Real Scalar>
 Lanes<Scalar> LocalSurface<Scalar>::squared_distances(const ConstPointsRef<Scalar>& x, const Wide& some,
                                                       const Tool<Scalar>& tool) const noexcept {
     if (!is_shaft(tool)) return squared_distances(x, some, tool.position);
-    return Lanes<Scalar>::of([&](std::size_t i) { return nearest(x, some[i], tool).on_triangle.squared_distance; });
+    return Lanes<Scalar>::of(
+        [&](std::size_t i) { return closest_to_axis(triangle(x, some[i]), tool).on_triangle.squared_distance; });
 }
 
 }  // namespace membrane

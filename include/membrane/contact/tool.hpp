@@ -55,6 +55,13 @@ template <Real Scalar>
     return !tool.axis.isZero(0);
 }
 
+/// The nearest points of the triangle and the tool's axis.
+template <Real Scalar>
+[[nodiscard]] SegmentPair<Scalar> closest_to_axis(const Triangle<Scalar>& triangle, const Tool<Scalar>& tool) noexcept {
+    if (!is_shaft(tool)) return {0, closest_point(triangle, tool.position)};
+    return closest_to_segment<Scalar>(triangle, tool.position, tool.position + tool.axis);
+}
+
 /// Number of pairs of features that can be in contact at once: 1 for a sphere; 5 for a capsule, its two ends and its
 /// axis across the three edges.
 template <Real Scalar>

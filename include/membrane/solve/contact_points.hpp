@@ -222,10 +222,9 @@ MEMBRANE_NOINLINE MEMBRANE_FLATTEN void add_forces(VertexRows<Scalar>& rows, Con
         auto row = gather_padded(rows.force.data(), pack.corner[k].data());
         const Wide now = load.force * load.weights[i], before = applied.force * applied.weights[i];
         const Vector3<Wide> change = before * applied.normal - now * load.normal;
-        Wide& contact_stiffness = row.extra;
         row.point += change;
         const Wide stiffer = load.stiffness[i] - applied.stiffness[i];
-        if (!pack.on_fixed) contact_stiffness += stiffer;
+        if (!pack.on_fixed) row.extra += stiffer;  // the contact stiffness
         scatter_padded(row, rows.force.data(), pack.corner[k].data());
         if (!pack.on_fixed) return;
         for (std::size_t lane = 0; lane < Wide::count; ++lane) {
@@ -363,16 +362,15 @@ MEMBRANE_INLINE Lanes<Scalar> solve(VertexRows<Scalar>& rows, const typename Lan
                                     const PackResponse<Scalar>& response, LocatedPack<Scalar>& now,
                                     ContactPack<Scalar>& pack, ContactPass<Scalar>& pass) noexcept {
     using Wide = Lanes<Scalar>;
-    const Wide& gap = now.gap;
     const auto moves = acts & (response.compliance > 0);
     const Wide divisor = select<Wide>(moves, response.compliance, 1);
-    Wide change = larger<Wide>(-gap / divisor, -pack.load.force);
+    Wide change = larger<Wide>(-now.gap / divisor, -pack.load.force);
     // The response leaves out that a rocking triangle shifts the force between supports: it may be too small. If the
     // changes alternate, they are halved.
     if (pack.on_fixed) change = select<Wide>(change * pack.change < 0, change / 2, change);
     // At equilibrium the contact force balances the other forces at the corners, now or once the gap is closed. If it
     // is much larger, a tool has jumped to the wrong side of some points, and they press against one another.
-    const Wide limit = 2 * (response.balanced_force + abs(gap) * response.internal_stiffness);
+    const Wide limit = 2 * (response.balanced_force + abs(now.gap) * response.internal_stiffness);
     const auto too_hard = moves & (pack.load.force + change > limit);
     change = select<Wide>(too_hard, -pack.load.force, change);
     pass.released = pass.released || any(too_hard);

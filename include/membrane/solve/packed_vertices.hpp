@@ -81,9 +81,7 @@ class PackedVertices {
     /// The first pack whose first vertex is at position `first` or later in pack order.
     [[nodiscard]] std::size_t pack_from(std::size_t first) const noexcept {
         const auto packs = packs_.items();
-        const auto begins_before = [](const Pack& pack, std::size_t at) { return pack.first < at; };
-        return static_cast<std::size_t>(std::lower_bound(packs.begin(), packs.end(), first, begins_before) -
-                                        packs.begin());
+        return static_cast<std::size_t>(std::ranges::lower_bound(packs, first, {}, &Pack::first) - packs.begin());
     }
 
     /// The end of the group of pack `p`, at most `end`.
@@ -165,13 +163,11 @@ class PackedVertices {
 
     template <class Scene>
     using VolumeOf = std::remove_cvref_t<decltype(std::declval<const Scene&>().volume)>;
-    template <class Scene>
-    [[nodiscard]] static auto& spring_of(Terms& terms) noexcept {
-        return *std::launder(reinterpret_cast<InLanes<SpringOf<VolumeOf<Scene>, Scalar>>*>(&terms.spring));
-    }
-    template <class Scene>
-    [[nodiscard]] static const auto& spring_of(const Terms& terms) noexcept {
-        return *std::launder(reinterpret_cast<const InLanes<SpringOf<VolumeOf<Scene>, Scalar>>*>(&terms.spring));
+    template <class Scene, class SomeTerms>
+    [[nodiscard]] static auto& spring_of(SomeTerms& terms) noexcept {
+        using Spring = InLanes<SpringOf<VolumeOf<Scene>, Scalar>>;
+        using Here = std::conditional_t<std::is_const_v<SomeTerms>, const Spring, Spring>;
+        return *std::launder(reinterpret_cast<Here*>(&terms.spring));
     }
     template <class Scene>
     using NetworkOf = std::remove_cvref_t<decltype(std::declval<const Scene&>().network)>;
