@@ -29,7 +29,7 @@ void press(const examples::Specimen& body, const std::string& name, double secon
 
     // 5 cm of the hand correspond to the membrane's size. The middle of the device's workspace is just above it, "up"
     // is outward.
-    membrane::DeviceScale scale{.motion = body.size / 0.05};
+    examples::DeviceScale scale{.motion = body.size / 0.05};
     scale.device.rotation =
         Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitY(), body.outward).toRotationMatrix();
     scale.device.origin = body.above(0.4);

@@ -16,15 +16,15 @@
 #include <membrane/contact/tool.hpp>
 #include <membrane/haptics/device_profile.hpp>
 #include <membrane/haptics/force_limits.hpp>
-#include <membrane/haptics/units.hpp>
 
 #include "openhaptics/servo_report.hpp"
+#include "openhaptics/units.hpp"
 
 namespace examples {
 
 struct OpenHapticsOptions {
     std::string name = {};               ///< Of the device in the vendor's set-up; if empty, the default device.
-    membrane::DeviceScale scale = {};    ///< How hand and scene correspond.
+    DeviceScale scale = {};              ///< How hand and scene correspond.
     double radius = 0;                   ///< Of the tool [m].
     double shaft = 0;                    ///< Of the tool, from the tip along the stylus [m]; zero for a sphere.
     membrane::LimitOptions limits = {};  ///< All are on; each can be taken off.
@@ -263,7 +263,7 @@ typename OpenHapticsDevice<Hd>::Force OpenHapticsDevice<Hd>::compute_force(const
     if (is_valid(tool)) {
         try {
             const Answer result = tick_(tool);
-            force = options_.scale.to_device(membrane::Newtons(result.force)).device_force.value();
+            force = options_.scale.to_device(Newtons(result.force)).device_force.value();
             solves_ = result.solves;
         } catch (...) {
             exception_ = std::current_exception();
@@ -280,9 +280,9 @@ typename OpenHapticsDevice<Hd>::Force OpenHapticsDevice<Hd>::compute_force(const
 
 template <class Hd>
 void OpenHapticsDevice<Hd>::write(const Force& force) noexcept {
-    Hd::set_force(membrane::Newtons(force));
+    Hd::set_force(Newtons(force));
     if (take_errors()) {
-        Hd::set_force(membrane::Newtons(Force::Zero()));
+        Hd::set_force(Newtons(Force::Zero()));
     } else {
         report_.max_force = std::max(report_.max_force, membrane::norm<double>(force));
     }

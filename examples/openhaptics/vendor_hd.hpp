@@ -9,7 +9,8 @@
 #include <thread>
 
 #include <HD/hd.h>
-#include <membrane/haptics/units.hpp>
+
+#include "openhaptics/units.hpp"
 
 /// The few functions of the vendor's HD interface that the adapter calls, each by what it is for.
 namespace examples {
@@ -52,10 +53,8 @@ struct VendorHd {
     static void end_frame(Device device) noexcept { hdEndFrame(device); }
 
     // NaN if the device does not respond.
-    static membrane::Millimetres position() noexcept { return membrane::Millimetres(vector(HD_CURRENT_POSITION)); }
-    static membrane::MillimetresPerSecond velocity() noexcept {
-        return membrane::MillimetresPerSecond(vector(HD_CURRENT_VELOCITY));
-    }
+    static Millimetres position() noexcept { return Millimetres(vector(HD_CURRENT_POSITION)); }
+    static MillimetresPerSecond velocity() noexcept { return MillimetresPerSecond(vector(HD_CURRENT_VELOCITY)); }
     /// Along the stylus, from the tip to the hand, of length 1.
     static membrane::Vector3<double> stylus() noexcept {
         const auto columns = numbers<16>(HD_CURRENT_TRANSFORM);
@@ -72,9 +71,7 @@ struct VendorHd {
         const auto motors = numbers<6>(HD_MOTOR_TEMPERATURE, 0);  // devices have three or six
         return *std::max_element(motors.begin(), motors.end());
     }
-    static void set_force(const membrane::Newtons& force) noexcept {
-        hdSetDoublev(HD_CURRENT_FORCE, force.value().data());
-    }
+    static void set_force(const Newtons& force) noexcept { hdSetDoublev(HD_CURRENT_FORCE, force.value().data()); }
 
     static double seconds() noexcept {
         return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();

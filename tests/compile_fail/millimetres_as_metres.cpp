@@ -2,11 +2,11 @@
 // A position of a device in millimetres where metres are meant.
 // expect: Millimetre
 // expect: no match for|invalid operands|no viable
-#include <membrane/haptics/units.hpp>
+#include "../../examples/openhaptics/units.hpp"
 
-membrane::Metres moved(const membrane::Metres& place, const membrane::Millimetres& displacement) {
+examples::Metres moved(const examples::Metres& place, const examples::Millimetres& displacement) {
 #ifdef CORRECT
-    return place + membrane::in_metres(displacement);
+    return place + examples::in_metres(displacement);
 #else
     return place + displacement;
 #endif

@@ -52,10 +52,6 @@
 #include <membrane/haptics/handover.hpp>
 // [/handover]
 
-// [units]
-#include <membrane/haptics/units.hpp>
-// [/units]
-
 // [recording]
 #include <membrane/haptics/recording_file.hpp>
 // [/recording]
@@ -128,6 +124,9 @@
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
 
+// [units]
+#include "openhaptics/units.hpp"
+// [/units]
 #include "support/catch.hpp"
 
 // A region declares what its page's loop declares, though the test's fixture has some of it.
@@ -628,13 +627,13 @@ TEST_CASE("pages: device in millimetres") {
     membrane::ScriptedDevice<double> device({{.time = 0}}, {.tick = 1e-3});
     // [units]
     const auto scale =
-        membrane::DeviceScale{.force = 40, .motion = 0.1};  // 40 times the force, 10 times the displacement
-    const auto seen = scale.to_scene(membrane::Millimetres(position), membrane::MillimetresPerSecond(velocity));
-    device.write(scale.to_device(membrane::Newtons(force)).device_force.value());
+        examples::DeviceScale{.force = 40, .motion = 0.1};  // 40 times the force, 10 times the displacement
+    const auto seen = scale.to_scene(examples::Millimetres(position), examples::MillimetresPerSecond(velocity));
+    device.write(scale.to_device(examples::Newtons(force)).device_force.value());
     // [/units]
     CHECK(seen.position.z() == Approx(0.0108));
     CHECK(device.force().z() == 0.4);
-    CHECK(scale.at_device(membrane::NewtonsPerMetre(40)).value() == Approx(160));
+    CHECK(scale.at_device(examples::NewtonsPerMetre(40)).value() == Approx(160));
 }
 
 TEST_CASE_METHOD(Touched, "pages: two loops") {

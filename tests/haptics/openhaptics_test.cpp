@@ -162,7 +162,7 @@ TEST_CASE("tools come in the scene, and forces go out of it", "[openhaptics]") {
         hd.hand.button = random.chance(0.5);
         hd.stylus = random.unit_vector();
         const double shaft = random.chance(0.5) ? 0.03 : 0;
-        DeviceScale scale{.force = random.number(10.0, 50.0), .motion = random.number(0.01, 2.0)};
+        examples::DeviceScale scale{.force = random.number(10.0, 50.0), .motion = random.number(0.01, 2.0)};
         scale.device.rotation = random.rotation();
         scale.device.origin = random.vector();
         OpenHaptics device({.scale = scale, .radius = 1e-3, .shaft = shaft, .limits = only_peak});

@@ -11,7 +11,6 @@
 #include <membrane/haptics/recording.hpp>
 #include <membrane/haptics/simulated_hand.hpp>
 #include <membrane/haptics/smooth_contact.hpp>
-#include <membrane/haptics/units.hpp>
 #include <membrane/haptics/virtual_coupling.hpp>
 #include <membrane/membrane.hpp>
 #include <membrane/model/cohesive_springs.hpp>
@@ -241,12 +240,6 @@ TEMPLATE_TEST_CASE("hands and loops meet without exceptions", "[noexcept]", TEST
         static_assert(noexcept(moved.publish(vertices, x, 0.0))&& noexcept(moved.read()));
         static_assert(noexcept(moved.publish_all(x, 0.0))&& noexcept(moved.publish_all(x, triangles, 0.0)));
         static_assert(noexcept(pose.publish(tool, 0.0))&& noexcept(pose.read())&& noexcept(pose.read().age(0.0)));
-    });
-    static_cast<void>([](const DeviceScale& scale, const Millimetres& place, const MillimetresPerSecond& speed,
-                         const Newtons& force, NewtonsPerMetre stiffness) {
-        static_assert(noexcept(scale.to_scene(place))&& noexcept(scale.to_scene(speed)));
-        static_assert(noexcept(scale.to_scene(place, speed))&& noexcept(scale.to_device(force)));
-        static_assert(noexcept(scale.at_device(stiffness))&& noexcept(in_metres(place))&& noexcept(in_metres(speed)));
     });
     SUCCEED();
 }

@@ -17,9 +17,9 @@
 #include <membrane/haptics/rest_contact.hpp>
 #include <membrane/haptics/simulated_hand.hpp>
 #include <membrane/haptics/smooth_contact.hpp>
-#include <membrane/haptics/units.hpp>
 #include <membrane/haptics/virtual_coupling.hpp>
 
+#include "openhaptics/units.hpp"
 #include "support/whole_loop.hpp"
 
 /// The complete loop of a hand, and what can go wrong in it.
@@ -64,7 +64,7 @@ struct HapticLoop {
         observer.update(hand.position, felt, dt);
         if (recorder.missed() > 100) recorder.clear();
         recorder.add(hand, felt);
-        const auto device_force = scale.to_device(membrane::Newtons(felt.template cast<double>())).device_force;
+        const auto device_force = scale.to_device(examples::Newtons(felt.template cast<double>())).device_force;
         device.write(device_force.value().template cast<S>());
         draw(hand);
         ++ticks;
@@ -98,8 +98,8 @@ struct HapticLoop {
     membrane::Recorder<S> recorder{1000, mesh.vertex_count()};
 
     /// The hand goes twice as far as the tool, elsewhere and turned.
-    membrane::DeviceScale scale = [] {
-        membrane::DeviceScale s{.force = 1, .motion = 0.5};
+    examples::DeviceScale scale = [] {
+        examples::DeviceScale s{.force = 1, .motion = 0.5};
         s.device.rotation << 0, 0, 1, 1, 0, 0, 0, 1, 0;
         s.device.origin = {0, 0, 0.002};
         return s;
@@ -127,8 +127,8 @@ struct HapticLoop {
 
     [[nodiscard]] membrane::Tool<S> in_scene(const membrane::Tool<S>& at_desk, const Fault& fault) const noexcept {
         const auto there =
-            scale.to_scene(in_millimetres(membrane::Metres(at_desk.position.template cast<double>())),
-                           in_millimetres(membrane::MetresPerSecond(at_desk.velocity.template cast<double>())));
+            scale.to_scene(in_millimetres(examples::Metres(at_desk.position.template cast<double>())),
+                           in_millimetres(examples::MetresPerSecond(at_desk.velocity.template cast<double>())));
         auto tool = at_desk;
         tool.position = (there.position + fault.tip).template cast<S>();
         tool.velocity = there.velocity.template cast<S>();

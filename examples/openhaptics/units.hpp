@@ -10,12 +10,12 @@
 
 /// Conversion between a device in millimetres and a scene in metres; force scale between a tissue and a hand.
 ///
-///     const membrane::DeviceScale scale{.force = 40, .motion = 0.1};  // the tool moves a tenth of the hand's motion
-///     membrane::Tool<double> tool = scale.to_scene(membrane::Millimetres(position),
-///                                                  membrane::MillimetresPerSecond(velocity));
-///     const auto felt = scale.to_device(membrane::Newtons(reaction));  // device_force, scene_force, scale
+///     const examples::DeviceScale scale{.force = 40, .motion = 0.1};  // the tool moves a tenth of the hand's motion
+///     membrane::Tool<double> tool = scale.to_scene(examples::Millimetres(position),
+///                                                  examples::MillimetresPerSecond(velocity));
+///     const auto felt = scale.to_device(examples::Newtons(reaction));  // device_force, scene_force, scale
 ///     write(felt.device_force.value());                         // [N]
-namespace membrane {
+namespace examples {
 
 /// A number or vector with its unit: units do not mix, and no conversion to a plain number is implicit.
 template <class Unit, class Value>
@@ -55,11 +55,11 @@ struct NewtonPerMillimetre;
 
 ///@{
 /// Positions, velocities, forces and stiffnesses with their units.
-using Metres = In<unit::Metre, Vector3<double>>;
-using Millimetres = In<unit::Millimetre, Vector3<double>>;
-using MetresPerSecond = In<unit::MetrePerSecond, Vector3<double>>;
-using MillimetresPerSecond = In<unit::MillimetrePerSecond, Vector3<double>>;
-using Newtons = In<unit::Newton, Vector3<double>>;
+using Metres = In<unit::Metre, membrane::Vector3<double>>;
+using Millimetres = In<unit::Millimetre, membrane::Vector3<double>>;
+using MetresPerSecond = In<unit::MetrePerSecond, membrane::Vector3<double>>;
+using MillimetresPerSecond = In<unit::MillimetrePerSecond, membrane::Vector3<double>>;
+using Newtons = In<unit::Newton, membrane::Vector3<double>>;
 using NewtonsPerMetre = In<unit::NewtonPerMetre, double>;
 using NewtonsPerMillimetre = In<unit::NewtonPerMillimetre, double>;
 ///@}
@@ -92,11 +92,11 @@ struct FeltForce {
 /// Scales between hand and tool. A needle perforates the lens capsule of a pig at 15 to 35 mN [Perforation16]; a
 /// `force` of 30 to 100 makes 0.5 to 3.5 N of it.
 struct DeviceScale {
-    double force = 1;                ///< force at the hand over force at the tissue
-    double motion = 1;               ///< motion of the tool over motion of the hand
-    RigidFrame<double> device = {};  ///< the fixed frame of the device in the scene; origin in metres of the scene
+    double force = 1;                          ///< force at the hand over force at the tissue
+    double motion = 1;                         ///< motion of the tool over motion of the hand
+    membrane::RigidFrame<double> device = {};  ///< the fixed frame of the device in the scene; origin in its metres
 
-    /// @throws InvalidInput if a scale is not finite and positive
+    /// @throws `InvalidInput` if a scale is not finite and positive
     void validate() const;
 
     ///@{
@@ -110,9 +110,9 @@ struct DeviceScale {
     ///@}
 
     /// The tool of the scene; the caller sets radius, axis, time and grasping.
-    [[nodiscard]] Tool<double> to_scene(const Millimetres& position,
-                                        const MillimetresPerSecond& velocity) const noexcept {
-        Tool<double> tool;
+    [[nodiscard]] membrane::Tool<double> to_scene(const Millimetres& position,
+                                                  const MillimetresPerSecond& velocity) const noexcept {
+        membrane::Tool<double> tool;
         tool.position = to_scene(position).value();
         tool.velocity = to_scene(velocity).value();
         return tool;
@@ -131,13 +131,15 @@ struct DeviceScale {
 
 inline void DeviceScale::validate() const {
     const auto check_scale = [](double value, std::string_view field) {
-        if (!is_finite(value) || !(value > 0)) {
-            refuse("DeviceScale", field, " must be finite and positive, got ", value);
+        if (!membrane::is_finite(value) || !(value > 0)) {
+            membrane::refuse("DeviceScale", field, " must be finite and positive, got ", value);
         }
     };
     check_scale(force, "force");
     check_scale(motion, "motion");
-    if (!is_finite(device.rotation) || !is_finite(device.origin)) refuse("DeviceScale", "device must be finite");
+    if (!membrane::is_finite(device.rotation) || !membrane::is_finite(device.origin)) {
+        membrane::refuse("DeviceScale", "device must be finite");
+    }
 }
 
-}  // namespace membrane
+}  // namespace examples

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/haptics/units.hpp>
+#include "openhaptics/units.hpp"
 
 #include <cmath>
 #include <concepts>
@@ -11,7 +11,8 @@
 #include "support/random.hpp"
 #include "support/refusal.hpp"
 
-using namespace membrane;
+using namespace examples;
+using membrane::InvalidInput;
 using test::Random;
 
 namespace {
@@ -42,18 +43,23 @@ TEST_CASE("units do not mix", "[units]") {
     STATIC_REQUIRE_FALSE(Adds<Metres, Millimetres>);
     STATIC_REQUIRE_FALSE(Adds<Metres, Newtons>);
     STATIC_REQUIRE_FALSE(Adds<Metres, MetresPerSecond>);
-    STATIC_REQUIRE_FALSE(Adds<Metres, Vector3<double>>);
+    STATIC_REQUIRE_FALSE(Adds<Metres, membrane::Vector3<double>>);
     STATIC_REQUIRE_FALSE(Compares<Metres, Millimetres>);
-    STATIC_REQUIRE_FALSE(std::convertible_to<Vector3<double>, Metres>);
-    STATIC_REQUIRE_FALSE(std::convertible_to<Metres, Vector3<double>>);
+    STATIC_REQUIRE_FALSE(std::convertible_to<membrane::Vector3<double>, Metres>);
+    STATIC_REQUIRE_FALSE(std::convertible_to<Metres, membrane::Vector3<double>>);
     STATIC_REQUIRE_FALSE(std::constructible_from<Metres, Millimetres>);
     STATIC_REQUIRE_FALSE(std::assignable_from<Metres&, Millimetres>);
     STATIC_REQUIRE_FALSE(std::convertible_to<double, NewtonsPerMetre>);
     STATIC_REQUIRE_FALSE(std::constructible_from<NewtonsPerMetre, NewtonsPerMillimetre>);
     STATIC_REQUIRE(OfDevice<Millimetres> && OfTissue<Newtons>);
     STATIC_REQUIRE_FALSE(OfDevice<Metres>);
-    STATIC_REQUIRE_FALSE(OfDevice<Vector3<double>>);
+    STATIC_REQUIRE_FALSE(OfDevice<membrane::Vector3<double>>);
     STATIC_REQUIRE_FALSE(OfTissue<Millimetres>);
+    static_cast<void>([](const DeviceScale& scale, const Millimetres& place, const MillimetresPerSecond& speed) {
+        static_assert(noexcept(scale.to_scene(place))&& noexcept(scale.to_scene(place, speed)));
+        static_assert(noexcept(scale.to_device(Newtons({0, 0, 1})))&& noexcept(in_metres(speed)));
+        static_assert(noexcept(scale.at_device(NewtonsPerMetre(1))));
+    });
     CHECK((Metres({1, 2, 3}) + Metres({0.5, 0, 0})) - Metres({1, 2, 3}) == 0.5 * Metres({1, 0, 0}));
 }
 
@@ -63,10 +69,10 @@ TEST_CASE("a device in millimetres, a scene in metres, a force in newtons", "[un
     scale.device.rotation << 0, 0, 1, 1, 0, 0, 0, 1, 0;
     scale.device.origin = {0.5, 0, -0.25};
     const auto tool = scale.to_scene(Millimetres({12, -8, 100}), MillimetresPerSecond({250, 0, -40}));
-    CHECK((tool.position - Vector3<double>(0.525, 0.003, -0.252)).cwiseAbs().maxCoeff() <= 1e-12);
-    CHECK((tool.velocity - Vector3<double>(-0.01, 0.0625, 0)).cwiseAbs().maxCoeff() <= 1e-12);
+    CHECK((tool.position - membrane::Vector3<double>(0.525, 0.003, -0.252)).cwiseAbs().maxCoeff() <= 1e-12);
+    CHECK((tool.velocity - membrane::Vector3<double>(-0.01, 0.0625, 0)).cwiseAbs().maxCoeff() <= 1e-12);
     const auto felt = scale.to_device(Newtons({0.012, -0.025, 0}));  // a sclera, a lens capsule
-    CHECK((felt.device_force.value() - Vector3<double>(-1, 0, 0.48)).cwiseAbs().maxCoeff() <= 1e-12);
+    CHECK((felt.device_force.value() - membrane::Vector3<double>(-1, 0, 0.48)).cwiseAbs().maxCoeff() <= 1e-12);
     CHECK(felt.scene_force == Newtons({0.012, -0.025, 0}));
     CHECK(felt.scale == 40);
     CHECK(scale.at_device(NewtonsPerMetre(12)).value() == Approx(120).epsilon(1e-12));
