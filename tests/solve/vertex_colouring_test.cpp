@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/solve/vertex_colouring.hpp>
+#include <membrane/solve/propagation_queue.hpp>
 
 #include <algorithm>
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/solve/vertex_update.hpp>
+#include <membrane/solve/step_rule.hpp>
 
 #include <array>
 #include <cmath>

@@ -3,7 +3,8 @@
 
 #include <limits>
 
-#include <membrane/solve/vertex_update.hpp>
+#include <membrane/solve/step_rule.hpp>
+#include <membrane/solve/vertex_rows.hpp>
 
 #include "support/vertex_energy.hpp"
 

@@ -10,7 +10,6 @@
 #include <membrane/core/index_set.hpp>
 #include <membrane/solve/propagation_queue.hpp>
 #include <membrane/solve/step.hpp>
-#include <membrane/solve/vertex_colouring.hpp>
 
 /// The vertices that a step updates.
 ///

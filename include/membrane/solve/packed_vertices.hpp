@@ -16,7 +16,8 @@
 #include <membrane/core/fixed_vector.hpp>
 #include <membrane/core/lane_points.hpp>
 #include <membrane/solve/packed_elements.hpp>
-#include <membrane/solve/vertex_update.hpp>
+#include <membrane/solve/step_rule.hpp>
+#include <membrane/solve/vertex_rows.hpp>
 
 /// Updates of vertices in SIMD lanes, one vertex in each.
 ///
@@ -177,6 +178,7 @@ class PackedVertices {
                             const Network& network) noexcept;
     template <class Network>
     [[nodiscard]] bool append_pack(std::span<const Index> vertices, const Network& network) noexcept;
+    template <class Network>
     void truncate(const Extent& extent) noexcept;
     void need(Index v) noexcept {
         unsigned char& marked = is_needed_[static_cast<std::size_t>(v)];
@@ -274,7 +276,7 @@ template <Real Scalar>
 template <class Network>
 void PackedVertices<Scalar>::assign(std::span<const Index> vertices, std::span<const std::size_t> ends,
                                     const Network& network) noexcept {
-    truncate({});
+    truncate<Network>({});
     given_ = vertices.size();
     is_whole_ = fits_ = pack(vertices, 0, ends, network);
     assigned_ = {members_.size(), packs_.size(), slot_count_, needed_.size()};
@@ -284,7 +286,7 @@ template <Real Scalar>
 template <class Network>
 void PackedVertices<Scalar>::append(std::span<const Index> vertices, std::size_t begin,
                                     std::span<const std::size_t> ends, const Network& network) noexcept {
-    truncate(assigned_);
+    truncate<Network>(assigned_);
     fits_ = is_whole_ && pack(vertices, begin, ends, network);
 }
 
@@ -306,11 +308,12 @@ bool PackedVertices<Scalar>::pack(std::span<const Index> vertices, std::size_t b
 }
 
 template <Real Scalar>
+template <class Network>
 void PackedVertices<Scalar>::truncate(const Extent& extent) noexcept {
     for (const Index v : needed_.items().subspan(extent.needed)) is_needed_[static_cast<std::size_t>(v)] = 0;
     members_.truncate(extent.members);
     packs_.truncate(extent.packs);
-    elements_.truncate(extent.packs);
+    if constexpr (HasElements<Network>) elements_.truncate(extent.packs);
     slot_count_ = extent.slot_count;
     needed_.truncate(extent.needed);
 }
@@ -326,7 +329,10 @@ bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const 
     Pack pack{members_.size(), vertices.size(), slot_count_, springs, {}, false};
     pack.own.fill(unused_row_);
     for (std::size_t i = 0; i < vertices.size(); ++i) pack.own[i] = begin_of_row(vertices[i]);
-    if (!elements_.append(vertices, pack.own, network) || !packs_.try_push_back(pack)) return false;
+    if constexpr (HasElements<Network>) {
+        if (!elements_.append(vertices, pack.own, network)) return false;
+    }
+    if (!packs_.try_push_back(pack)) return false;
     const auto own_slots = std::span(slots_).subspan(slot_count_, springs);
     for (Slot& slot : own_slots) slot = {Scalar(0), Scalar(1), pack.own};
     for (std::size_t i = 0; i < vertices.size(); ++i) {
@@ -541,9 +547,11 @@ auto PackedVertices<Scalar>::energy_change(std::size_t p, const Vector3<Wide>& h
         const SpringElement<Wide, std::remove_cvref_t<decltype(law)>> spring{&law, slot.stiffness, slot.rest_length};
         sum += spring.template energy_change<Wide>({here, gather(rows, slot.other.data())}, 0, displacement);
     }
-    elements_.for_each(p, here, rows, scene.network, [&](const auto& element, const auto& x, std::size_t i) {
-        sum += element.energy_change(x, i, displacement);
-    });
+    if constexpr (HasElements<NetworkOf<Scene>>) {
+        elements_.for_each(p, here, rows, scene.network, [&](const auto& element, const auto& x, std::size_t i) {
+            sum += element.energy_change(x, i, displacement);
+        });
+    }
     return sum;
 }
 
@@ -554,9 +562,11 @@ MEMBRANE_FLATTEN void PackedVertices<Scalar>::evaluate_residual(std::size_t p, c
     const auto& own = packs_[p].own;
     const Vector3<Wide> here = gather(rows.position.data(), own.data());
     auto springs = springs_on<VertexForce<Wide>>(p, here, scene);
-    elements_.for_each(p, here, rows.position.data(), scene.network,
-                       [&](const auto& element, const auto& x, std::size_t i)
-                           MEMBRANE_INLINE_LAMBDA { springs.force += element.force_on(x, i).force; });
+    if constexpr (HasElements<NetworkOf<Scene>>) {
+        elements_.for_each(p, here, rows.position.data(), scene.network,
+                           [&](const auto& element, const auto& x, std::size_t i)
+                               MEMBRANE_INLINE_LAMBDA { springs.force += element.force_on(x, i).force; });
+    }
     VertexForce<Wide> others;
     if constexpr (!std::same_as<VolumeOf<Scene>, NoFoundation>) others = foundation_on(p, here, scene);
     const Vector3<Wide> force = springs.force + (others.force + gather(rows.force.data(), own.data()));

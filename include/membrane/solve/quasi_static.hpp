@@ -24,7 +24,6 @@
 #include <membrane/solve/step.hpp>
 #include <membrane/solve/step_rule.hpp>
 #include <membrane/solve/vertex_rows.hpp>
-#include <membrane/solve/vertex_update.hpp>
 #include <membrane/surface/vertex_split.hpp>
 
 /// The quasi-static solver: equilibrium positions of the membrane and its reactions.

@@ -7,7 +7,7 @@
 #include <type_traits>
 
 #include <membrane/solve/contact_state.hpp>
-#include <membrane/solve/vertex_update.hpp>
+#include <membrane/solve/vertex_rows.hpp>
 
 /// The stiffness of vertices that constraints cannot move freely, against these constraints: constraints that cannot
 /// all hold then share the violation.

@@ -14,11 +14,15 @@
 #include <membrane/core/lanes.hpp>
 #include <membrane/model/elastic_network.hpp>
 
-/// Step rules: the displacement of a vertex for the force on it.
+/// Step rules, and the vertex update: the displacement of a vertex for the force on it. One code serves one vertex and
+/// several.
 ///
 ///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6}, membrane::MassStep{});  // (4) as published
 ///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6}, membrane::SafeStep{.omega = 1.5});
 ///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6}, membrane::BlockStep{});
+///
+///     const auto move = membrane::move_of(rule, vertex, force_tolerance);
+///     if (move.moves) position += move.displacement;
 namespace membrane {
 
 /// Compliance: multiplied with a force, it gives a displacement [m/N].
@@ -214,6 +218,75 @@ MEMBRANE_INLINE Symmetric3<Scalar> BlockStep::compliance(const VertexState<Scala
     Symmetric3<Scalar> compliance = inverse(block, select<Scalar>(resists, relaxation * per_stiffness, Scalar(0)));
     if (vertex.constrained) detail::add_stiffness(compliance, vertex.contact_stiffness, vertex.contact_normal);
     return compliance;
+}
+
+inline namespace MEMBRANE_INSTRUCTION_SET {
+
+/// The displacement of a vertex, or of several, by a rule.
+template <Number N, class Compliance>
+struct VertexMove {
+    using YesNo = decltype(N() < N());  ///< a truth value for each vertex
+
+    Compliance compliance;    ///< [m/N]
+    N least;                  ///< lower bound of the compliance in any direction [m/N]
+    Vector3<N> displacement;  ///< [m]
+    YesNo moves;              ///< whether the force is above the tolerance
+    YesNo may_overshoot;      ///< whether the displacement may be unstable, by the stiffness bound
+};
+
+///@{
+/// A compliance as a 3 x 3 block.
+template <Number N>
+[[nodiscard]] const Symmetric3<N>& as_block(const Symmetric3<N>& block) noexcept {
+    return block;
+}
+template <Number N>
+[[nodiscard]] Symmetric3<N> as_block(const N& number) noexcept {
+    return diagonal3(number);
+}
+///@}
+
+/// The displacement of `vertex` by `rule`: compliance times force; zero if the force is at most `force_tolerance` [N].
+template <class Rule, Number N>
+[[nodiscard]] MEMBRANE_INLINE auto move_of(const Rule& rule, const VertexState<N>& vertex,
+                                           Each<N> force_tolerance) noexcept {
+    const auto compliance = compliance_of(rule, vertex);
+    VertexMove<N, std::remove_cvref_t<decltype(compliance)>> move;
+    move.compliance = compliance;
+    if constexpr (moves_along_force<Rule, Each<N>>) {
+        move.least = compliance;
+        move.may_overshoot = is_descent_rule<Rule> ? N(0) > N(0) : compliance * vertex.stiffness >= 2;
+    } else {
+        const auto resists = vertex.stiffness > 0;
+        move.least = select<N>(resists, 1 / select<N>(resists, vertex.stiffness, 1), 0);
+        move.may_overshoot = N(0) > N(0);
+    }
+    move.displacement = compliance * vertex.force;
+    move.moves = norm(vertex.force) > force_tolerance;
+    return move;
+}
+
+}  // namespace MEMBRANE_INSTRUCTION_SET
+
+/// Whether an update needs a line search: springs or elements may stiffen, and `Rule` guarantees descent.
+template <class Rule, class Network>
+inline constexpr bool needs_line_search = !Network::never_stiffens && is_descent_rule<Rule>;
+
+/// Whether the majoriser bounds the energy of `Network`, and `Rule` evaluates it.
+template <class Rule, class Network>
+inline constexpr bool has_energy_bound = requires {
+    requires Rule::needs_majoriser;
+    requires Network::bounds_energy;
+};
+
+/// Whether the majoriser of `vertex` shows that a displacement does not raise the energy.
+template <Number N>
+[[nodiscard]] MEMBRANE_INLINE auto surely_descends(const VertexState<N>& vertex,
+                                                   const Vector3<N>& displacement) noexcept {
+    const N square = squared_norm(displacement), part = 1 / (1 + root_of<N>(square) / vertex.size);
+    const N reduction = part * dot<N>(displacement, vertex.stiffness_reduction * displacement);
+    const N quadratic = larger<N>((vertex.stiffness * square - reduction) / 2, 0);
+    return vertex.remainder.at(square, quadratic) <= dot<N>(vertex.force, displacement) - quadratic;
 }
 
 }  // namespace membrane

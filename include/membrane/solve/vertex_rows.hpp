@@ -4,11 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <type_traits>
 #include <vector>
 
 #include <membrane/core/index_set.hpp>
 #include <membrane/core/lane_points.hpp>
 #include <membrane/core/symmetric3.hpp>
+#include <membrane/model/mass_spring_network.hpp>
+#include <membrane/model/volume_springs.hpp>
 #include <membrane/surface/vertex_split.hpp>
 
 namespace membrane {
@@ -183,6 +186,17 @@ struct VertexRows {
     }
 };
 
+/// The input of one step, and the current positions.
+template <class Scalar, class Network, class Volume>
+struct StepInput {
+    const ConstPointsRef<Scalar>& start;  ///< positions when the step began, 3 x V [m]
+    const ConstPointsRef<Scalar>& x;      ///< positions now, 3 x V [m]
+    Scalar dt;                            ///< [s]
+    const Network& network;               ///< springs and elements
+    const Volume& volume;                 ///< the foundation
+    VertexRows<Scalar>& rows;             ///< of the solver
+};
+
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
 template <Real Scalar>
@@ -230,6 +244,46 @@ void VertexRows<Scalar>::rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noe
         kept.compliance = rotated(kept.compliance, rotation);
         set_response(v, kept, compliance(v));
     }
+}
+
+/// Force and stiffness on vertex `v` by foundation, damping and constraints, without the network.
+template <class Scalar, class Network, class Volume>
+[[nodiscard]] VertexForce<Scalar> non_network_force(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
+    const auto& rows = scene.rows;
+    const Scalar stiffness = rows.contact_stiffness(v) + rows.added_stiffness[static_cast<std::size_t>(v)];
+    if constexpr (std::is_same_v<Volume, NoFoundation>) return {rows.constraint_force(v), stiffness};
+    const auto foundation = scene.volume.force_on(v, point(scene.x, v), point(scene.start, v), scene.dt);
+    return {foundation.force + rows.constraint_force(v), foundation.stiffness + stiffness};
+}
+
+/// Sum of all forces on vertex `v`, and its stiffness.
+template <class Scalar, class Network, class Volume>
+[[nodiscard]] VertexForce<Scalar> total_force(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
+    const auto springs = scene.network.force_on(v, scene.x), others = non_network_force(scene, v);
+    return {springs.force + others.force, springs.stiffness + others.stiffness};
+}
+
+/// The force `now` on vertex `v`, without damping: damping may balance the forces for one tick out of equilibrium.
+template <class Scalar, class Network, class Volume>
+[[nodiscard]] Vector3<Scalar> undamped_force(const StepInput<Scalar, Network, Volume>& scene, Index v,
+                                             const Vector3<Scalar>& now) noexcept {
+    const Vector3<Scalar> here = point(scene.x, v), start = point(scene.start, v);
+    if constexpr (HasSprings<Volume, Scalar>) {
+        const auto spring = scene.volume.spring(v, start, scene.dt);
+        return spring.damps() ? Vector3<Scalar>(now - spring.damping_force(here)) : now;
+    } else {
+        const Vector3<Scalar> still = scene.volume.force_on(v, here, here, scene.dt).force;
+        const Vector3<Scalar> moving = scene.volume.force_on(v, here, start, scene.dt).force;
+        return now + (still - moving);
+    }
+}
+
+/// Whether updates of a vertex by `compliance` times its force diverge: each overshoots by more than the last.
+template <class Scalar, class Network, class Volume>
+[[nodiscard]] bool diverges(const StepInput<Scalar, Network, Volume>& scene, Index v, Scalar compliance) noexcept {
+    const Scalar others = non_network_force(scene, v).stiffness;
+    if (compliance * (scene.network.force_on(v, scene.x).stiffness + others) < 2) return false;
+    return compliance * (largest_eigenvalue(scene.network.hessian(v, scene.x)) + others) >= 2;
 }
 
 }  // namespace membrane
