@@ -15,11 +15,11 @@
 
 /// Sparse factors of a symmetric matrix of 3 x 3 blocks, one for each vertex and each pair of linked vertices.
 ///
-///     membrane::BlockCholesky factors(vertex_count, springs);                // offline
+///     membrane::BlockCholesky factors(network.vertex_count(), network.springs());   // offline
 ///     factors.open();
-///     factors.add(v, block);                                                // on the diagonal
-///     factors.subtract(s, block);                                           // at spring s, off the diagonal
-///     if (factors.definite_above(0.5)) ...                                  // proven: no eigenvalue is below 0.5
+///     factors.add(v, block);                                                        // on the diagonal
+///     factors.subtract(s, block);                                                   // at spring s, off the diagonal
+///     if (factors.definite_above(0.5)) ...                                          // proven: no eigenvalue below 0.5
 namespace membrane {
 
 /// Sparse Cholesky factorisation in the order of `nested_dissection`. The columns of a part have blocks in the same

@@ -28,7 +28,7 @@ struct ElasticState {
 /// the foundation after an infinite tick, without damping. A linear foundation that has anchors and, in double, a
 /// `hessian` is evaluated from these; any other one in its own scalar.
 ///
-///     Elasticity elasticity(network, volume);
+///     membrane::Elasticity elasticity(network, foundation);
 ///     const auto state = elasticity.at(x);                    // state.springs + state.foundation [N]
 ///     elasticity.add_stiffness(state, system);
 template <class Network, class Volume>

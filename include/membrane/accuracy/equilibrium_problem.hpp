@@ -18,7 +18,7 @@
 /// The balance of forces on a membrane of linear springs.
 ///
 ///     membrane::EquilibriumProblem problem(network);                                            // offline
-///     if (problem.assign(x, network, foundation, membrane::pull(7, target)) != ProblemStatus::valid) ...
+///     if (problem.assign(x, network, foundation, membrane::pull(7, target)) != membrane::ProblemStatus::valid) ...
 ///     problem.forces(problem.centre(), force, magnitude);                                // [N]
 namespace membrane {
 

@@ -19,7 +19,7 @@ namespace membrane {
 
 /// Newton's method on one scene, see `equilibrium`. Combines the other components.
 ///
-///     EquilibriumSolver(x, mesh.triangles(), Elasticity(network, volume), scene, fixed, options).run(constraint_count)
+///     membrane::EquilibriumSolver(x, mesh.triangles(), elasticity, scene, fixed, options).run(constraint_count);
 template <class ElasticModel>
 class EquilibriumSolver {
   public:

@@ -13,8 +13,8 @@
 ///
 ///     #include <membrane/accuracy/mesh_error.hpp>
 ///     const auto force = [&](const membrane::TriangleMesh<double>& mesh) {      // the scene on any mesh
-///         const membrane::VirtualVolumeSprings foundation(mesh, ...);
-///         return membrane::equilibrium(...).reactions[0].norm();
+///         const auto [network, foundation, press] = scene_on(mesh);
+///         return membrane::equilibrium(mesh.positions(), mesh, network, foundation, {}, press).reactions[0].norm();
 ///     };
 ///     const auto estimate = membrane::estimated_mesh_error(mesh, force);
 ///     estimate.error();                                                         // of the force, relative

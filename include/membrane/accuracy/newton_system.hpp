@@ -14,7 +14,7 @@
 
 /// The linear problem of one Newton step under constraints.
 ///
-///     NewtonSystem system(fixed);                                  // fixed[v]: vertex v takes a prescribed step
+///     membrane::NewtonSystem system(fixed);                        // fixed[v]: vertex v takes a prescribed step
 ///     system.open(prescribed);
 ///     system.add(v, w, block);  system.add_force(v, force);  system.add({corners, gradients, gap, false});
 ///     const auto& [step, multipliers] = system.solve(stiffness);

@@ -14,7 +14,7 @@
 ///
 ///     membrane::TangentStiffness tangent(network);                                  // offline: allocates all it needs
 ///     const auto feel = tangent.compute(solver.queue().vertices(), x, network, foundation, membrane::pull(7, target));
-///     if (feel.status == TangentStatus::found) largest_eigenvalue(feel.stiffness);  // [N/m]
+///     if (feel.status == membrane::TangentStatus::found) largest_eigenvalue(feel.stiffness);  // [N/m]
 namespace membrane {
 
 /// Options of a `TangentStiffness`.

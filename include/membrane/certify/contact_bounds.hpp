@@ -18,7 +18,7 @@
 ///
 ///     membrane::ContactBounds pressed(problem);
 ///     pressed.assign(problem, triangles, y, scene.tools(), rest.contacts);
-///     if (pressed.bound_softening(problem, force, magnitude, displacement)) ... pressed.softening(v) ...
+///     if (pressed.bound_softening(problem, force, magnitude, 1e-5)) stiffness -= pressed.softening(v);  // [N/m]
 namespace membrane {
 
 /// Bounds for tools in contact that hold at all states whose vertices are within `max_displacement` of y.

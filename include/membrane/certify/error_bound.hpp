@@ -21,11 +21,11 @@
 ///     const auto report = solver.step(x, dt, network, foundation, membrane::pull(7, target));
 ///     const auto error = bound.compute(x, network, foundation, membrane::pull(7, target));
 ///     if (error.certified()) {
-///         error.position                                              // no vertex is farther from its equilibrium [m]
-///         error.reactions[0].max_distance_to(report.reactions[0])                   // error bound of a force [N]
+///         error.position;                                             // no vertex is farther from its equilibrium [m]
+///         error.reactions[0].max_distance_to(report.reactions[0]);    // error bound of a force [N]
 ///     }
-///
 /// With a tool in contact, from an equilibrium computed by Newton's method:
+///
 ///     const auto rest = membrane::equilibrium(x, mesh, network, foundation, {}, press(tool, contact));
 ///     const auto error = bound.compute(rest, x, mesh, network, foundation, press(tool, contact));
 namespace membrane {

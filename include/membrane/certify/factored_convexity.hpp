@@ -13,7 +13,7 @@
 /// The sharper of two bounds of the convexity of a membrane's energy, for soft foundations.
 ///
 ///     #include <membrane/certify/factored_convexity.hpp>
-///     membrane::ErrorBound<FactoredConvexity> bound(network);
+///     membrane::ErrorBound<membrane::FactoredConvexity> bound(network);
 namespace membrane {
 
 /// Assembles the bounds of all springs in one matrix and factorises it. Springs in tension stabilise those in

@@ -14,9 +14,9 @@ namespace membrane {
 
 /// Rows of different lengths, stored contiguously in one array.
 ///
-///     const CompressedRows<Index> triangles_of(vertex_count, [&](auto put) {
-///         for (Index f = 0; f < triangles.cols(); ++f) {
-///             for (const Index v : triangles.col(f)) put(v, f);
+///     const membrane::CompressedRows<membrane::Index> triangles_of(mesh.vertex_count(), [&](auto put) {
+///         for (membrane::Index f = 0; f < triangles.cols(); ++f) {
+///             for (const membrane::Index v : triangles.col(f)) put(v, f);
 ///         }
 ///     });
 template <class Item>

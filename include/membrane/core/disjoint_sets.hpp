@@ -10,7 +10,7 @@ namespace membrane {
 
 /// Disjoint sets of the numbers from 0 to `count` - 1, with union and find.
 ///
-///     DisjointSets parts(triangle_count);
+///     membrane::DisjointSets parts(mesh.triangle_count());
 ///     parts.unite(f, g);
 ///     parts.find(f) == parts.find(g);
 class DisjointSets {

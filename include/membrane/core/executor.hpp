@@ -9,8 +9,8 @@
 
 /// Execution of independent tasks.
 ///
-///     const auto in_my_pool = [&pool](membrane::Index count, const auto& task) { pool.for_each(count, task); };
-///     const membrane::SolverOptions options{.order = membrane::UpdateOrder::colour_all};
+///     const auto in_my_pool = [&](membrane::Index count, const auto& task) { pool.for_each(count, task); };
+///     const membrane::SolverOptions<double> options{.order = membrane::UpdateOrder::colour_all};
 ///     auto solver = membrane::QuasiStaticSolver(network, options, rule, in_my_pool);
 namespace membrane {
 

@@ -13,8 +13,8 @@ namespace membrane {
 
 /// One number for all vertices or springs, or one for each.
 ///
-///     VolumeSpringOptions<double> uniform{.stiffness = 8.0};
-///     VolumeSpringOptions<double> graded{.stiffness = std::vector<double>{8.0, 9.5, 11.0}};
+///     membrane::VolumeSpringOptions<double> uniform{.stiffness = 8.0};
+///     membrane::VolumeSpringOptions<double> graded{.stiffness = std::vector<double>{8.0, 9.5, 11.0}};
 template <Real Scalar>
 class Field {
   public:

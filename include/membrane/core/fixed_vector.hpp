@@ -13,7 +13,7 @@ namespace membrane {
 /// A vector of fixed capacity: allocates only when constructed or copied. (A copied `std::vector` loses its reserved
 /// capacity.)
 ///
-///     FixedVector<ContactPoint<double>> points(4096);
+///     membrane::FixedVector<membrane::ContactPoint<double>> points(4096);
 ///     if (!points.try_push_back(point)) return;  // full
 template <class Item>
 class FixedVector {

@@ -13,9 +13,9 @@ namespace membrane {
 
 /// A set of vertex or triangle indices in order of insertion. `clear` is O(1), amortised.
 ///
-///     IndexSet found(mesh.triangle_count());
+///     membrane::IndexSet found(mesh.triangle_count());
 ///     if (found.insert(f)) { ... }         // f was not in it
-///     for (const Index f : found.items()) { ... }
+///     for (const membrane::Index f : found.items()) { ... }
 class IndexSet {
   public:
     IndexSet() = default;  ///< An empty set for no indices.

@@ -9,7 +9,7 @@ namespace membrane {
 /// Passes values from one writer thread to one reader thread; neither ever waits. Each thread owns one of three slots,
 /// and one atomic exchange swaps it with the middle slot.
 ///
-///     TripleBuffer<Pose> poses;
+///     membrane::TripleBuffer<Pose> poses;
 ///     poses.back() = pose;  poses.publish();             // one thread
 ///     if (poses.acquire()) draw(poses.front());          // another thread
 ///

@@ -71,8 +71,8 @@ struct PassivityReport {
 ///
 /// The loop is passive if the damping b of device and hand and the friction c of the device satisfy
 ///
-///     b >= K T / 2 + B + max(K, N) delay,                                         [Colgate97], extended by the delay
-///     c >= (max(K, N) / 2 + B / T) resolution + off_potential,                    [Abbott05], extended
+/// - b >= K T / 2 + B + max(K, N) delay,                                           [Colgate97], extended by the delay
+/// - c >= (max(K, N) / 2 + B / T) resolution + off_potential,                      [Abbott05], extended
 ///
 /// and K is at most `DeviceProfile::stiffness`. The rest of c, over `max_speed`, counts as damping [Diolaiti06]. The
 /// conditions are sufficient. For N <= K the first is necessary if the hand may be any passive system. Derivation:
@@ -91,7 +91,7 @@ inline void require_passive(const SampledLoop& loop, const DeviceProfile& device
 /// The energy that a hand has put into the loop, updated each tick [Hannaford02]. If it falls below zero, the loop has
 /// given more energy than it received.
 ///
-///     membrane::PassivityObserver observer(2.0);             // lower bound of device and hand damping [N s/m]
+///     membrane::PassivityObserver observer(2.0);          // lower bound of device and hand damping [N s/m]
 ///     observer.update(tool.position, force, dt);          // the force that is written in this tick
 ///     if (observer.energy() < 0) ...                      // active
 class PassivityObserver {

@@ -17,8 +17,8 @@
 
 /// Self-intersections of a surface.
 ///
-///     const bool all = for_each_self_intersection(x, triangles, some, representative, effort,
-///                                                 [&](membrane::Index f, membrane::Index g) { ... });
+///     const bool all = membrane::for_each_self_intersection(x, triangles, some, representative, effort,
+///                                                           [&](membrane::Index f, membrane::Index g) { ... });
 namespace membrane {
 
 /// Calls `found(f, g)`, f < g, for each pair of the triangles `some` that meet outside their shared vertices and edges.

@@ -19,7 +19,7 @@
 ///     const auto sphere = membrane::distmesh(membrane::Ball{.radius = 1}, {.edge_length = 0.1});
 ///     const auto bowl   = membrane::distmesh(membrane::trimmed(membrane::Ball{.radius = 1}, membrane::HalfSpace{}),
 ///                                            {.edge_length = 0.1});                  // the lower half, with a border
-///     const auto own    = membrane::distmesh([](const membrane::Vector3<double>& p) { return ...; },
+///     const auto own    = membrane::distmesh([](const membrane::Vector3<double>& p) { return norm(p) - 1; },
 ///                                            {.edge_length = 0.1,
 ///                                             .bounds = membrane::Bounds{{-1, -1, -1}, {1, 1, 1}}});
 namespace membrane {

@@ -11,7 +11,7 @@
 
 /// The number of layers for a membrane on a foundation.
 ///
-///     const auto layers = membrane::recommended_layers(mesh, tissue, layer);
+///     const auto layers = membrane::recommended_layers(mesh, material, layer);
 ///     auto solver = membrane::QuasiStaticSolver(network, {.layers = layers.tangential});
 namespace membrane {
 

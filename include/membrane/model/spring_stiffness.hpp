@@ -16,8 +16,8 @@
 /// tool: see `tool_radius`.
 ///
 ///     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
-///                                                      {.stiffness = membrane::spring_stiffnesses(mesh, tissue),
-///                                                       .mass = membrane::vertex_masses(mesh, tissue)});
+///                                                      {.stiffness = membrane::spring_stiffnesses(mesh, material),
+///                                                       .mass = membrane::vertex_masses(mesh, material)});
 ///     const auto foundation =
 ///         membrane::FoundationSprings(mesh, {.normal = membrane::normal_stiffnesses(mesh, layer),
 ///                                            .tangential = membrane::tangential_stiffnesses(mesh, layer),

@@ -19,7 +19,7 @@
 /// Constraints: arguments of a step that act on the membrane from outside.
 ///
 ///     const auto report = solver.step(x, dt, network, foundation, press(tool, contact), pull(tool, grasp));
-///     report.reactions[0]                                          // force of the membrane on the pressing tool [N]
+///     report.reactions[0];                                         // force of the membrane on the pressing tool [N]
 namespace membrane {
 
 /// A constraint on the membrane for one step. `begin` seeds all vertices where its force enters, and moves attached

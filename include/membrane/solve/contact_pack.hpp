@@ -15,7 +15,7 @@
 
 /// Contact points in packs.
 ///
-///     state.packs.append(points, 0, [&](Index v) { return context.fixed(v); });
+///     state.packs.append(points, 0, [&](membrane::Index v) { return context.fixed(v); });
 ///     for (auto& pack : state.packs.items()) { ... }
 namespace membrane {
 

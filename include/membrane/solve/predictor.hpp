@@ -14,7 +14,7 @@
 /// The extrapolation from which a step starts: a factor of the last displacements.
 ///
 ///     const double factor = predictor.extrapolation_factor(inputs);   // 1: the tools move steadily; 0: they stopped
-///     for (v : moved) x.col(v) += factor * last_displacements.col(v);
+///     for (const auto v : moved) x.col(v) += factor * last_displacements.col(v);
 namespace membrane {
 
 /// The current value of the input that drives a constraint, from a hand or a script.

@@ -21,7 +21,7 @@
 ///
 ///     const auto contact = tracker.update(tree, x, tool);
 ///     const auto report  = solver.step(x, dt, network, foundation, press(tool, contact));
-///     report.reactions[0]                                                    // force of the membrane on the tool [N]
+///     report.reactions[0];                                                   // force of the membrane on the tool [N]
 namespace membrane {
 
 /// Keeps the surface outside the tool, without friction. Each pair of a triangle in contact and a feature of the tool

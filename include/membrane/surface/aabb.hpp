@@ -11,7 +11,7 @@
 /// Axis-aligned boxes, and tests of points and capsules against them.
 ///
 ///     membrane::Aabb<double> box;
-///     for (membrane::Index v = 0; v < mesh.vertex_count(); ++v) box.include(point(x, v));
+///     for (membrane::Index v = 0; v < mesh.vertex_count(); ++v) box.include(membrane::point(x, v));
 ///     if (squared_distance(box, tool.position) > tool.radius * tool.radius) return;  // no contact
 namespace membrane {
 

@@ -12,7 +12,7 @@
 
 /// The half-edges of all triangles, grouped by edge: the input of checks and adjacency.
 ///
-///     for_each_edge(half_edges(triangles), [](std::span<const HalfEdge> sides) {
+///     membrane::for_each_edge(membrane::half_edges(triangles), [](std::span<const membrane::HalfEdge> sides) {
 ///         // sides.size() is 1 at a border, 2 inside a surface, more at a non-manifold edge
 ///     });
 namespace membrane {

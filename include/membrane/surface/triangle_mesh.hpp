@@ -29,15 +29,14 @@ namespace membrane {
 template <Real Scalar>
 class TriangleMesh {
   public:
-    /// From points 3 x V [m] and triangles 3 x F of any integer type, counter-clockwise seen from outside.
+    /// From points 3 x V [m] and triangles 3 x F of any integer type, counter-clockwise seen from outside. O(F log F).
     /// @throws InvalidInput unless
-    ///   - the shapes are as above, there is at least one triangle, and each has three different vertices that exist;
-    ///   - coordinates are finite, squares of areas neither overflow nor vanish, and the mean edge is at least a
-    ///     thousand times the spacing of numbers at the largest coordinate: in float, edges of 1 mm within 8 m of 0;
-    ///   - some triangle has an area;
-    ///   - no two triangles have the same three vertices, at most two share an edge and they run along it in opposite
-    ///     directions, and the triangles of each vertex form one fan.
-    /// O(F log F).
+    /// - the shapes are as above, there is at least one triangle, and each has three different vertices that exist;
+    /// - coordinates are finite, squares of areas neither overflow nor vanish, and the mean edge is at least a
+    ///   thousand times the spacing of numbers at the largest coordinate: in float, edges of 1 mm within 8 m of 0;
+    /// - some triangle has an area;
+    /// - no two triangles have the same three vertices, at most two share an edge and they run along it in opposite
+    ///   directions, and the triangles of each vertex form one fan.
     template <class P, class T>
     TriangleMesh(const Eigen::MatrixBase<P>& positions, const Eigen::MatrixBase<T>& triangles);
 

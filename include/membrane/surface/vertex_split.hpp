@@ -13,7 +13,7 @@
 
 /// Changes of a surface that tears, which all parts that know its triangles follow.
 ///
-///     for (const auto& event : tear.update(x, tissue, foundation)) {
+///     for (const auto& event : tear.update(x, dt, tissue, foundation)) {
 ///         tissue.split(event.split);
 ///         tree.split(event.split);
 ///     }

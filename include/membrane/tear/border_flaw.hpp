@@ -11,7 +11,7 @@
 
 /// The energy that a flaw of the border releases as it becomes a tear.
 ///
-///     const auto border = membrane::border_state(tear.surface(), v, x, tissue);
+///     const auto border = membrane::border_state<double>(tear.surface(), v, x, tissue);
 ///     const auto force = membrane::flaw_driving_force(border, 20e-6);  // of a flaw of 20 um [N]
 namespace membrane {
 
