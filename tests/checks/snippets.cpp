@@ -239,11 +239,6 @@ extern std::ifstream stream;
 extern const membrane::Vector3<double> above, below;
 // [/haptics/simulated_hand]
 
-// [haptics/units]
-extern const membrane::Vector3<double> position, velocity;
-void write(const membrane::Vector3<double>& force);
-// [/haptics/units]
-
 // [mesh_check/box_pairs]
 extern const std::vector<membrane::Aabb<double>> boxes;
 // [/mesh_check/box_pairs]
@@ -337,14 +332,14 @@ extern const std::vector<membrane::DrivingInput<double>> inputs;
 extern const membrane::Points<double> last_displacements;
 // [/solve/predictor]
 
-// [solve/vertex_colouring]
+// [solve/propagation_queue]
 extern membrane::IndexSet vertices;
-// [/solve/vertex_colouring]
+// [/solve/propagation_queue]
 
-// [solve/vertex_update]
+// [solve/step_rule]
 extern const membrane::VertexState<double> vertex;
 extern membrane::Vector3<double> position;
-// [/solve/vertex_update]
+// [/solve/step_rule]
 
 // [surface/mesh_checks]
 extern const std::vector<membrane::HalfEdge> sides;

@@ -21,7 +21,7 @@
 ///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6}, membrane::SafeStep{.omega = 1.5});
 ///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6}, membrane::BlockStep{});
 ///
-///     const auto move = membrane::move_of(rule, vertex, force_tolerance);
+///     const auto move = membrane::move_of(rule, vertex, rows.force_tolerance);
 ///     if (move.moves) position += move.displacement;
 namespace membrane {
 
