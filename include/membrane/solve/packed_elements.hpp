@@ -10,8 +10,9 @@
 #include <vector>
 
 #include <membrane/core/fixed_vector.hpp>
+#include <membrane/core/in_lanes.hpp>
 #include <membrane/core/lane_points.hpp>
-#include <membrane/tissue/elements.hpp>
+#include <membrane/model/element.hpp>
 
 /// Elements of vertices that are updated in SIMD lanes.
 ///
@@ -20,6 +21,10 @@
 ///         sum += element.force_on(x, i);
 ///     });
 namespace membrane {
+
+// Of tissue/elements.hpp, which comes with each network that has elements.
+template <Real Scalar_, CheckedElement Each>
+class Elements;
 
 /// A network with elements beside its springs: `Tissue`.
 template <class Network>
@@ -53,12 +58,12 @@ class PackedElements {
     ///@}
 
     /// Appends a pack of `vertices`, whose rows are `own`. False if it exceeds the capacity. Online.
-    template <class Network>
+    template <HasElements Network>
     [[nodiscard]] bool append(std::span<const Index> vertices, const Begins& own, const Network& network) noexcept;
 
     /// Calls `act(element, x, place)` for the elements of pack `p`: constants and corners are of one element in each
     /// lane, corner number `place` is the vertex, `here`.
-    template <class Network, class Act>
+    template <HasElements Network, class Act>
     void for_each(std::size_t p, const Vector3<Wide>& here, const PaddedPoint<Scalar>* rows, const Network& network,
                   const Act& act) const noexcept;
 
@@ -72,7 +77,7 @@ class PackedElements {
         std::array<Begins, E::corner_count - 1> others;  // the corners but for the vertex
     };
     template <class E>
-        requires(!ElementInLanes<E, Scalar>)
+        requires(!Elements<Scalar, E>::in_lanes)
     struct alignas(32) Slot<E> {
         Begins vertex;  // that has an element in this slot, or `no_index`
         std::array<Begins, E::corner_count - 1> others;
@@ -88,9 +93,9 @@ class PackedElements {
     static void fill_lane(Slot<E>& slot, std::size_t lane, std::size_t place, const ElementInstance<E>& at) noexcept;
     // Number `n` of the elements at the vertex of each lane.
     template <class E>
-    [[nodiscard]] static LaneByLane<E, Scalar> one_by_one(const Elements<Scalar, E>& elements, const Slot<E>& slot,
-                                                          std::size_t place, Index n) noexcept {
-        LaneByLane<E, Scalar> all;
+    [[nodiscard]] static auto one_by_one(const Elements<Scalar, E>& elements, const Slot<E>& slot, std::size_t place,
+                                         Index n) noexcept {
+        typename Elements<Scalar, E>::OneByOne all;
         for (std::size_t lane = 0; lane < Wide::count; ++lane) {
             const Index v = slot.vertex[lane];
             if (v != no_index) all.of_lane[lane] = &elements.at(v, place)[static_cast<std::size_t>(n)].instance.element;
@@ -123,7 +128,7 @@ MEMBRANE_INLINE void PackedElements<Scalar>::for_each_group([[maybe_unused]] con
         std::size_t group = 0;
         network.for_each_kind([&]<class E>(const Elements<Scalar, E>& elements) MEMBRANE_INLINE_LAMBDA {
             const auto if_used = [&](auto place) MEMBRANE_INLINE_LAMBDA {
-                if constexpr (detail::is_place<E>(place)) act(elements, place, group++);
+                if constexpr (Elements<Scalar, E>::is_place(place)) act(elements, place, group++);
             };
             [&]<std::size_t... place>(std::index_sequence<place...>) MEMBRANE_INLINE_LAMBDA {
                 (if_used(std::integral_constant<std::size_t, place>()), ...);
@@ -155,10 +160,9 @@ PackedElements<Scalar>::PackedElements(const Network& network, std::size_t capac
 }
 
 template <Real Scalar>
-template <class Network>
+template <HasElements Network>
 bool PackedElements<Scalar>::append(std::span<const Index> vertices, const Begins& own,
                                     const Network& network) noexcept {
-    if constexpr (!HasElements<Network>) return true;
     const std::size_t pack = begins_.size();
     if (!begins_.try_push_back(block_count_)) return false;
     bool fits = true;
@@ -175,7 +179,7 @@ bool PackedElements<Scalar>::append(std::span<const Index> vertices, const Begin
         for (; block_count_ < first + count * blocks<E>; block_count_ += blocks<E>) {
             auto* slot = new (&blocks_[block_count_]) Slot<E>();
             slot->others.fill(own);
-            if constexpr (!ElementInLanes<E, Scalar>) slot->vertex.fill(no_index);
+            if constexpr (!Elements<Scalar, E>::in_lanes) slot->vertex.fill(no_index);
         }
         counts_[pack * group_count_ + group] = static_cast<Index>(count);
         for (std::size_t lane = 0; lane < vertices.size(); ++lane) {
@@ -194,7 +198,7 @@ template <Real Scalar>
 template <class E>
 MEMBRANE_INLINE void PackedElements<Scalar>::fill_lane(Slot<E>& slot, std::size_t lane, std::size_t place,
                                                        const ElementInstance<E>& at) noexcept {
-    if constexpr (ElementInLanes<E, Scalar>) {
+    if constexpr (Elements<Scalar, E>::in_lanes) {
         set_lane(slot.element, lane, at.element);
     } else {
         slot.vertex[lane] = at.corners[place];
@@ -205,11 +209,10 @@ MEMBRANE_INLINE void PackedElements<Scalar>::fill_lane(Slot<E>& slot, std::size_
 }
 
 template <Real Scalar>
-template <class Network, class Act>
+template <HasElements Network, class Act>
 MEMBRANE_INLINE void PackedElements<Scalar>::for_each(std::size_t p, const Vector3<Wide>& here,
                                                       const PaddedPoint<Scalar>* rows, const Network& network,
                                                       const Act& act) const noexcept {
-    if constexpr (!HasElements<Network>) return;
     std::size_t block = begins_[p];
     for_each_group(network, [&]<class E>(const Elements<Scalar, E>& elements, auto place,
                                          std::size_t group) MEMBRANE_INLINE_LAMBDA {
@@ -219,7 +222,7 @@ MEMBRANE_INLINE void PackedElements<Scalar>::for_each(std::size_t p, const Vecto
             for (std::size_t k = 0; k < E::corner_count; ++k) {
                 x[k] = k == place ? here : gather(rows, slot.others[k - (k > place)].data());
             }
-            if constexpr (ElementInLanes<E, Scalar>) {
+            if constexpr (Elements<Scalar, E>::in_lanes) {
                 act(slot.element, x, place);
             } else {
                 act(one_by_one(elements, slot, place, n), x, place);

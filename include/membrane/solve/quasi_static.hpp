@@ -7,13 +7,10 @@
 #include <cstdint>
 #include <limits>
 #include <span>
-#include <type_traits>
 #include <utility>
 
 #include <membrane/core/executor.hpp>
 #include <membrane/core/rigid_frame.hpp>
-#include <membrane/model/mass_spring_network.hpp>
-#include <membrane/model/volume_springs.hpp>
 #include <membrane/solve/active_vertices.hpp>
 #include <membrane/solve/constraints.hpp>
 #include <membrane/solve/contact_state.hpp>

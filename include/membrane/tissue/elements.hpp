@@ -79,15 +79,6 @@ template <class E>
     return static_cast<std::size_t>(std::find(order.begin(), order.end(), i) - order.begin());
 }
 
-/// Whether a corner comes to this place.
-template <class E>
-[[nodiscard]] constexpr bool is_place(std::size_t place) noexcept {
-    for (std::size_t i = 0; i < E::corner_count; ++i) {
-        if (place_of<E>(i) == place) return true;
-    }
-    return false;
-}
-
 /// `instance` with its corners in the order of corner `i`.
 template <class E>
 [[nodiscard]] ElementInstance<E> in_order_of(const ElementInstance<E>& instance, std::size_t i) noexcept {
@@ -155,6 +146,8 @@ class Elements {
     using Scalar = Scalar_;                                          ///< of the constants and forces
     static constexpr std::size_t corner_count = Each::corner_count;  ///< vertices of one element
     using Instance = ElementInstance<Each>;                          ///< one element with its vertices
+    static constexpr bool in_lanes = ElementInLanes<Each, Scalar>;   ///< whether several are evaluated at once
+    using OneByOne = LaneByLane<Each, Scalar>;                       ///< several of a kind that is not
 
     /// The elements `all` of `mesh`. @throws InvalidInput for a corner that is no vertex, or whose force or stiffness
     /// at rest is not finite: a triangle is too thin, or a constant too large, for the scalar. Cost: linear.
@@ -166,6 +159,14 @@ class Elements {
     /// All elements, in the order in which they were given.
     [[nodiscard]] std::span<const Instance> all() const& noexcept { return all_; }
     [[nodiscard]] std::vector<Instance> all() && noexcept { return std::move(all_); }
+
+    /// Whether a corner comes to this place.
+    [[nodiscard]] static constexpr bool is_place(std::size_t place) noexcept {
+        for (std::size_t i = 0; i < corner_count; ++i) {
+            if (detail::place_of<Each>(i) == place) return true;
+        }
+        return false;
+    }
 
     /// Calls `act(instance)` for each element.
     template <class Act>
