@@ -302,7 +302,7 @@ extern membrane::ConstraintContext<double> context;
 
 // [solve/contact_points]
 extern membrane::ContactState<double> contacts;
-extern const membrane::ContactTool<double> tool;
+extern const membrane::ToolShape<double> tool;
 extern const std::span<membrane::ContactPack<double>> packs;
 // [/solve/contact_points]
 

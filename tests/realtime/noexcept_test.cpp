@@ -128,7 +128,7 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", TEST_S
         static_assert(noexcept(packed.update(0, 1, scene, BlockStep{}, Constrained::no, executor)));
         static_assert(noexcept(packed.free_count(0))&& noexcept(packed.needed()));
     });
-    static_cast<void>([](VertexRows<S>& rows, ContactState<S>& contacts, const ContactTool<S>& tool,
+    static_cast<void>([](VertexRows<S>& rows, ContactState<S>& contacts, const ToolShape<S>& tool,
                          std::span<ContactPack<S>> packs, std::span<ContactPoint<S>> points) {
         static_assert(noexcept(rows.begin_step())&& noexcept(rows.reset()));
         static_assert(noexcept(contacts.begin_step())&& noexcept(contacts.end_step())&& noexcept(contacts.reset()));

@@ -52,7 +52,7 @@ struct Patch {
     }
     [[nodiscard]] std::array<Index, 3> corners(Index f) const { return {3 * f, 3 * f + 1, 3 * f + 2}; }
     [[nodiscard]] Triangle<S> triangle(Index f) const { return triangle_at(rows.positions(), corners(f)); }
-    [[nodiscard]] ContactTool<S> shape() const { return {tool.position, tool.axis, tool.position, tool.radius}; }
+    [[nodiscard]] ToolShape<S> shape() const { return {tool.position, tool.axis, tool.position, tool.radius}; }
     [[nodiscard]] std::vector<ContactPoint<S>> unpacked() const {
         auto found = points;
         contacts.packs.unpack(found);

@@ -17,7 +17,7 @@ enum class ContactPhase {
     ended,    ///< no contact, but contact in the last tick
 };
 
-/// A triangle that the tool touches.
+/// A triangle near the tool.
 struct ContactTriangle {
     Index triangle;                ///< its index
     std::array<Index, 3> corners;  ///< its vertices
@@ -52,7 +52,8 @@ struct Contact {
     // Valid until the tracker's next update.
     std::span<const ContactPoint<Scalar>>
         points;  ///< one for each pair of triangle and tool feature within `detection_distance`
-    std::span<const ContactTriangle> triangles;   ///< those the tool touches and those around the active one
+    std::span<const ContactTriangle>
+        triangles;  ///< within `detection_distance`, around the active one, on a path through
     std::span<const ContactTriangle> candidates;  ///< `triangles`, then those around them
     bool has_all_points = true;  ///< false if `points` exceeded its capacity: a step refuses this contact
     bool closed = false;         ///< whether the surface is closed: its back is its inside

@@ -148,7 +148,7 @@ template <Number Scalar>
 struct CurvedSum {
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
     Scalar stiffness = 0;                             ///< [N/m]
-    Symmetric3<Scalar> dyads;  ///< sum of r u u^T, r the stiffness reduction across a spring [N/m]
+    Symmetric3<Scalar> dyads;                         ///< sum of k min(r / l, 1) u u^T [N/m]
     ///@{
     /// The quotient is the smallest size: [N] over [N/m].
     Scalar size_force = 1, size_stiffness = 0;

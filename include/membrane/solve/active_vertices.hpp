@@ -75,9 +75,10 @@ class ActiveVertices {
         activated_.insert(v);
     }
 
-    /// Ends a step: awake are now the active and frontier vertices for which `is_balanced(v)` is false, the vertices
-    /// that had to wait, and the neighbours of those that `moved`; with `recheck`, because `is_balanced` has become
-    /// stricter, also vertices that fell asleep. Returns whether the forces on all vertices balance.
+    /// Ends a step: awake are now the active and frontier vertices for which `is_balanced(v)` is false (those of the
+    /// queue only if the next step may leave them out), the vertices that had to wait, and the neighbours of those that
+    /// `moved`; with `recheck`, because `is_balanced` has become stricter, also vertices that fell asleep. Returns
+    /// whether the forces on all vertices balance.
     template <class Network, class IsBalanced>
     [[nodiscard]] bool end_step(const Network& network, IsBalanced is_balanced, std::span<const Index> moved,
                                 bool recheck = false) noexcept;

@@ -22,14 +22,14 @@
 ///     report.reactions[0];                                         // force of the membrane on the pressing tool [N]
 namespace membrane {
 
-/// A constraint on the membrane for one step. `begin` seeds all vertices where its force enters, and moves attached
-/// points to their targets. `enforce` restores the constraint, and returns whether it was violated. It is called after
-/// each update of layer 0, several times in turns where constraints may oppose one another. If there is time, it is
-/// also called at the end of the step, unless nothing has changed since a call that found no violation. `reaction` is
-/// the force of the membrane on the constraint [N]. Optional members: `driving_input(): DrivingInput<Scalar>`, from
-/// which the next steps are extrapolated; `prescribe(context)`, which prescribes vertices and is called before any
-/// `begin`; `end(context)`, called after all reactions of a step that advanced, and not of one that is refused: for
-/// what a constraint keeps from step to step.
+/// A constraint on the membrane for one step. `begin` seeds all vertices where its force enters, applies the forces of
+/// the last step, and moves attached points to their targets. `enforce` restores the constraint, and returns whether it
+/// was violated. It is called after each update of layer 0, several times in turns where constraints may oppose one
+/// another. If there is time, it is also called at the end of the step, unless nothing has changed since a call that
+/// found no violation. `reaction` is the force of the membrane on the constraint [N]. Optional members:
+/// `driving_input(): DrivingInput<Scalar>`, from which the next steps are extrapolated; `prescribe(context)`, which
+/// prescribes vertices and is called before any `begin`; `end(context)`, called after all reactions of a step that
+/// advanced, and not of one that is refused: for what a constraint keeps from step to step.
 template <class C, class Scalar>
 concept Constraint = Real<Scalar> &&
     requires(const C& constraint, ConstraintContext<Scalar>& context, const ConstraintContext<Scalar>& done) {
@@ -187,7 +187,8 @@ class ConstraintList {
         }
         return changed;
     }
-    /// Computes the reactions; returns false if one is not finite. Updates the contact points from their packs.
+    /// Computes the reactions; returns false if one is not finite. Updates the contact points, stale since `begin`,
+    /// from their packs: before `find_violation` and `end`.
     [[nodiscard]] bool react(std::span<Vector3<Scalar>> reactions) const noexcept {
         auto& contacts = context_.contacts();
         contacts.packs.unpack(contacts.points.items());

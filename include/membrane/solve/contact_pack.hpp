@@ -53,14 +53,14 @@ struct alignas(32) ContactPack {
         /// Barycentric weights of the corners, and the unit normal.
         Vector3<Wide> weights, normal;
         ///@}
-        Wide force;               ///< multiplier [N], 0 or more
-        Vector3<Wide> stiffness;  ///< added to each corner along the normal [N/m]
+        Wide force;               ///< multiplier [N], 0 or more: -force normal acts on the membrane
+        Vector3<Wide> stiffness;  ///< of each corner along the normal, as the triangle rocks [N/m]
     };
 
     Load load;      ///< by the last pass
     Load applied;   ///< included in the rows of forces
     Wide distance;  ///< of the tool's axis from the points, along their normals [m]
-    Wide change;    ///< of the forces in the last pass, beside fixed or shared corners [N]
+    Wide change;    ///< of the forces in the last pass [N]
 
     Vector3<Wide> free;  ///< 1 for a corner that may move
     Wide side;           ///< of the points, see `ContactPoint::side`

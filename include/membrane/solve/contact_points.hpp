@@ -24,7 +24,7 @@ namespace membrane {
 
 /// The tool in contact.
 template <Real Scalar>
-struct ContactTool {
+struct ToolShape {
     ///@{
     /// End of the tool's axis, and the vector to its other end [m].
     Vector3<Scalar> position, axis;
@@ -42,13 +42,13 @@ struct ContactPass {
     bool deep = false;      ///< whether a penetration was more than `deep_overlap` of an edge
 };
 
-/// The penetration allowed at the end of a tick, relative to an edge [1].
+/// The penetration allowed at the end of a tick, relative to the first edge of a triangle [1].
 inline constexpr double deep_overlap = 0.005;
 
 /// One pass: locates each point at the current positions, and moves the free corners of a penetrating point until it is
 /// outside the tool. Returns whether a point moved. Online. Cost: linear in the points.
 template <Real Scalar>
-bool push_out(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts, const ContactTool<Scalar>& tool,
+bool push_out(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts, const ToolShape<Scalar>& tool,
               std::span<ContactPack<Scalar>> packs) noexcept;
 
 /// One pass of projected Gauss-Seidel: locates each point at the current positions, changes its force by the gap over
@@ -57,10 +57,10 @@ bool push_out(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts, const Co
 /// points.
 template <Real Scalar>
 ContactPass<Scalar> solve_contacts(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
-                                   const ContactTool<Scalar>& tool, std::span<ContactPack<Scalar>> packs,
+                                   const ToolShape<Scalar>& tool, std::span<ContactPack<Scalar>> packs,
                                    bool again = false) noexcept;
 
-/// Applies the forces found by these passes to the vertices.
+/// Adds the changes of the forces and of their stiffness since the last call to the rows of the vertices.
 template <Real Scalar>
 void apply_forces(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
                   std::span<ContactPack<Scalar>> packs) noexcept;
@@ -173,7 +173,7 @@ MEMBRANE_INLINE bool locate_in_faces(const Triangle<Lanes<Scalar>>& triangle, co
 /// Updates weights, normal and distance of a pack to the current positions. Its forces stay, but for points that no
 /// longer exist.
 template <Real Scalar>
-MEMBRANE_INLINE void locate(const ContactTool<Scalar>& tool, const std::array<PaddedLanes<Scalar>, 3>& corner,
+MEMBRANE_INLINE void locate(const ToolShape<Scalar>& tool, const std::array<PaddedLanes<Scalar>, 3>& corner,
                             ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     const Triangle<Wide> triangle{corner[0].point, corner[1].point, corner[2].point};
@@ -288,12 +288,12 @@ struct LocatedPack {
     Lanes<Scalar> gap;  // to the tool along the normals, with the displacement of fixed corners [m]
 };
 
-/// Locates the points of a pack; fixed corners respond to the forces so far.
+/// Locates the points of a pack. Fixed corners respond to the forces so far, which are added to the rows.
 template <Real Scalar>
-[[nodiscard]] MEMBRANE_NOINLINE MEMBRANE_FLATTEN LocatedPack<Scalar> located(VertexRows<Scalar>& rows,
-                                                                             ContactState<Scalar>& contacts,
-                                                                             const ContactTool<Scalar>& tool,
-                                                                             ContactPack<Scalar>& pack) noexcept {
+[[nodiscard]] MEMBRANE_NOINLINE MEMBRANE_FLATTEN LocatedPack<Scalar> located_pack(VertexRows<Scalar>& rows,
+                                                                                  ContactState<Scalar>& contacts,
+                                                                                  const ToolShape<Scalar>& tool,
+                                                                                  ContactPack<Scalar>& pack) noexcept {
     LocatedPack<Scalar> now{corners_of(rows, pack), {}, 0};
     locate(tool, now.corner, pack);
     if (pack.on_fixed) {
@@ -398,12 +398,12 @@ template <Real Scalar>
 }  // namespace detail
 
 template <Real Scalar>
-bool push_out(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts, const ContactTool<Scalar>& tool,
+bool push_out(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts, const ToolShape<Scalar>& tool,
               std::span<ContactPack<Scalar>> packs) noexcept {
     using Wide = Lanes<Scalar>;
     bool moved = false;
     for (auto& pack : packs) {
-        auto now = detail::located(rows, contacts, tool, pack);
+        auto now = detail::located_pack(rows, contacts, tool, pack);
         const auto inside = (pack.used > 0) & (-now.gap > detail::gap_tolerance(rows, now, pack));
         if (!any(inside)) continue;
         moved = true;
@@ -419,14 +419,14 @@ bool push_out(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts, const Co
 
 template <Real Scalar>
 MEMBRANE_FLATTEN ContactPass<Scalar> solve_contacts(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
-                                                    const ContactTool<Scalar>& tool,
-                                                    std::span<ContactPack<Scalar>> packs, bool again) noexcept {
+                                                    const ToolShape<Scalar>& tool, std::span<ContactPack<Scalar>> packs,
+                                                    bool again) noexcept {
     using Wide = Lanes<Scalar>;
     ContactPass<Scalar> pass;
     Wide largest = 0;
     for (auto& pack : packs) {
         if (again && !pack.acts) continue;
-        auto now = detail::located(rows, contacts, tool, pack);
+        auto now = detail::located_pack(rows, contacts, tool, pack);
         const auto acts = (pack.used > 0) & ((pack.load.force > 0) | (now.gap < 0));
         pack.acts = any(acts);
         if (!pack.acts) continue;

@@ -16,8 +16,8 @@
 
 /// Elements of vertices that are updated in SIMD lanes.
 ///
-///     elements.append(vertices, own, network);                                        // a pack: a vertex in each lane
-///     elements.for_each(p, here, rows, network, [&](const auto& element, const auto& x, std::size_t i) {
+///     elements.append(vertices, own, tissue);                                         // a pack: a vertex in each lane
+///     elements.for_each(p, here, rows, tissue, [&](const auto& element, const auto& x, std::size_t i) {
 ///         sum += element.force_on(x, i);
 ///     });
 namespace membrane {

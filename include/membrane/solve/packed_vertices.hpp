@@ -491,7 +491,7 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::move(std::size_t p, const PackState
     VertexRows<Scalar>& rows = scene.rows;
     const auto& own = packs_[p].own;
     const auto may_move = terms_[p].free != 0;
-    const bool in_queue = at.vertex.constrained || p < assigned_.packs;
+    const bool in_queue = p < assigned_.packs;
     const auto move = move_of(rule, at.vertex, in_queue ? rows.force_tolerance : rows.outside_tolerance());
     if constexpr (moves_along_force<Rule, Scalar> && !is_descent_rule<Rule>) {
         if (any(move.may_overshoot & may_move)) {

@@ -149,11 +149,11 @@ class QuasiStaticSolver {
     [[nodiscard]] StepReport<Scalar> step_in(TimeBudget budget, PointsRef<Scalar>& x, Scalar dt, const Network& network,
                                              const Volume& volume, Constraints constraints) noexcept;
     // In the order of a step.
+    template <class Volume>
+    bool follow_body(const Volume& volume) noexcept;
     template <class Network, class Volume>
     [[nodiscard]] StepStatus begin_constraints(const ConstraintList<Scalar>& acting, ConstraintContext<Scalar>& context,
                                                const Network& network, const Volume& volume) noexcept;
-    template <class Volume>
-    bool follow_body(const Volume& volume) noexcept;
     template <class Volume>
     void extrapolate(const ConstraintList<Scalar>& acting, ConstraintContext<Scalar>& context) noexcept;
     template <class Network>
@@ -333,7 +333,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     if (begun != StepStatus::advanced) return refuse_step(begun);
 
     const StepInput<Scalar, Network, Volume> scene{start, now, dt, network, volume, rows_};
-    set_supports(scene, contacts_, options_.rigid_stiffness, rows_.seeds.items());
+    set_supports(scene, contacts_, options_.rigid_stiffness, rows_.seeds.items());  // `begin` used the last ones
     seed_beside_moved_pins(network, context, body_moved);
     select(network, context);
     progress_ = {.budget = budget, .resume = resume_};
@@ -341,18 +341,39 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     sweep(scene, acting);
     if (advances() && !evaluate_residuals(scene)) {
         contacts_.reset_points();  // a force of the last step may have diverged
-        rows_.restore(start);      // not bounded at the start positions either: the input is invalid
-        report_.status = evaluate_residuals(scene) ? StepStatus::unstable : StepStatus::invalid_input;
+        rows_.restore(start);
+        const bool bounded = evaluate_residuals(scene);  // if not even at the start positions: the input is invalid
+        report_.status = bounded ? StepStatus::unstable : StepStatus::invalid_input;
     }
     if (advances() && !acting.react(reactions_)) report_.status = StepStatus::unstable;
     if (!advances()) return refuse_step(report_.status);
     acting.find_violation(report_);
     acting.end();
     resume_ = progress_.resume;
-    write_back(x, network);
+    write_back(x, network);  // from here on `start` shows the new positions
     measure_beyond(scene);
     progress_.budget.end();
     return report_;
+}
+
+// If the body has moved since the last step, and the membrane with it, rotates the cached vectors and returns true.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+template <class Volume>
+bool QuasiStaticSolver<Scalar, Rule>::follow_body([[maybe_unused]] const Volume& volume) noexcept {
+    if constexpr (moves<Volume>) {
+        const auto& body = volume.body();
+        const bool deformed = std::exchange(deformations_, body.deformations()) != body.deformations();
+        if (deformed) wake_all();
+        if (body.pose().same_pose(pose_)) return deformed;
+        const auto motion = motion_between(std::exchange(pose_, body.pose()), body.pose());
+        rows_.rotate(motion.rotation);
+        contacts_.rotate(motion.rotation);
+        for (const Index v : options_.predict ? moved_.items() : std::span<Index>()) {
+            last_displacements_.col(v) = motion.vector_to_world(point(last_displacements_, v));
+        }
+        return true;
+    }
+    return false;
 }
 
 // Extrapolates, and begins the constraints. Returns why the step is refused: an input is invalid, a part has missed a
@@ -374,26 +395,6 @@ StepStatus QuasiStaticSolver<Scalar, Rule>::begin_constraints(const ConstraintLi
     const StepStatus refusal = context.refusal();
     if (refusal == StepStatus::invalid_input) report_.invalid_constraint = context.invalid_constraint();
     return refusal;
-}
-
-// If the body has moved since the last step, and the membrane with it, rotates the cached vectors and returns true.
-template <Real Scalar, CheckedStepRule<Scalar> Rule>
-template <class Volume>
-bool QuasiStaticSolver<Scalar, Rule>::follow_body([[maybe_unused]] const Volume& volume) noexcept {
-    if constexpr (moves<Volume>) {
-        const auto& body = volume.body();
-        const bool deformed = std::exchange(deformations_, body.deformations()) != body.deformations();
-        if (deformed) wake_all();
-        if (body.pose().same_pose(pose_)) return deformed;
-        const auto motion = motion_between(std::exchange(pose_, body.pose()), body.pose());
-        rows_.rotate(motion.rotation);
-        contacts_.rotate(motion.rotation);
-        for (const Index v : options_.predict ? moved_.items() : std::span<Index>()) {
-            last_displacements_.col(v) = motion.vector_to_world(point(last_displacements_, v));
-        }
-        return true;
-    }
-    return false;
 }
 
 // Adds the extrapolated displacements to vertices of the queue that moved in the last step: those that a contact has
@@ -518,7 +519,7 @@ void QuasiStaticSolver<Scalar, Rule>::sweep(const Scene& scene, const Constraint
         if (!advances()) return;
         if (moved) progress_.constraints_hold = false;
         changed |= moved;
-        // The queue needs no more. If vertices outside have waited for it, they are next.
+        // The queue needs no more. If vertices outside have waited for it, they are next, with its tolerance.
         if (!changed && rows_.outside_tolerance() > rows_.force_tolerance) {
             rows_.queue_residual = 0;
             changed = true;
@@ -712,11 +713,11 @@ bool QuasiStaticSolver<Scalar, Rule>::evaluate_residuals(const Scene& scene) noe
             if (!prescribed.contains(v)) evaluate(v);
         }
     }
-    for (const Index v : prescribed.items()) evaluate(v);
+    for (const Index v : prescribed.items()) evaluate(v);  // in packs or not
     return is_finite(squares) && squares < largest * largest;
 }
 
-// Writes the positions of moved vertices, and wakes their neighbours.
+// Writes the positions of moved vertices, and ends the step: which vertices stay awake, and whether it has converged.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Network>
 void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Network& network) noexcept {

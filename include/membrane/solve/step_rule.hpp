@@ -34,10 +34,10 @@ concept Compliance = std::same_as<C, Scalar> || std::same_as<C, Symmetric3<Scala
 template <Number Scalar>
 struct VertexState : EnergyMajoriser<Scalar> {
     Scalar contact_stiffness = 0;  ///< the part of `stiffness` that acts along `contact_normal` alone [N/m]
-    Vector3<Scalar> contact_normal = Vector3<Scalar>::Zero();  ///< unit vector; zero without contact
+    Vector3<Scalar> contact_normal = Vector3<Scalar>::Zero();  ///< along the forces of constraints; zero without
     Scalar mass = 0;                                           ///< [kg], zero where the network has none
     Each<Scalar> dt = 0;                                       ///< [s]
-    bool constrained = false;                                  ///< a constraint acts on it
+    bool constrained = false;  ///< of layer 0: constraints set their forces by its response
 };
 
 /// A step rule: the compliance of a vertex [m/N], a number, or a `Symmetric3` for a rule whose displacements are not
@@ -204,12 +204,12 @@ MEMBRANE_INLINE Symmetric3<Scalar> BlockStep::compliance(const VertexState<Scala
     const auto resists = all_round > 0;
     const Scalar per_stiffness = 1 / select(resists, all_round, Scalar(1));
     const Each<Scalar> relaxation = detail::relaxation(omega, vertex);
-    const Scalar longest = per_stiffness * ((std::max)(relaxation, Each<Scalar>(1)) * norm(vertex.force));
+    const Scalar unreduced = per_stiffness * ((std::max)(relaxation, Each<Scalar>(1)) * norm(vertex.force));
     // A size above 1 / epsilon times the displacement may be reduced to it without loss.
-    const Scalar size = smaller<Scalar>(vertex.size, longest / Limits::epsilon() + (Limits::min)());
-    // With b = trace / (2 stiffness): rho^2 + (size (1 - b) - longest) rho = longest size.
-    const Scalar slack = size * (1 - per_stiffness * vertex.stiffness_reduction.trace() / 2) - longest;
-    const Scalar rho = (root_of<Scalar>(slack * slack + 4 * longest * size) - slack) / 2;
+    const Scalar size = smaller<Scalar>(vertex.size, unreduced / Limits::epsilon() + (Limits::min)());
+    // With b as above: rho^2 + (size (1 - b / stiffness) - unreduced) rho = unreduced size.
+    const Scalar slack = size * (1 - per_stiffness * vertex.stiffness_reduction.trace() / 2) - unreduced;
+    const Scalar rho = (root_of<Scalar>(slack * slack + 4 * unreduced * size) - slack) / 2;
     // Nearly flat springs leave H nearly singular: cbrt(epsilon) keeps the determinant above its rounding error.
     const auto flattest = static_cast<Each<Scalar>>(sizeof(Each<Scalar>) == 4 ? 4e-3 : 6e-6);
     const Scalar part = size / (size + larger<Scalar>(rho, flattest * size));
@@ -228,7 +228,7 @@ struct VertexMove {
     using YesNo = decltype(N() < N());  ///< a truth value for each vertex
 
     Compliance compliance;    ///< [m/N]
-    N least;                  ///< lower bound of the compliance in any direction [m/N]
+    N least;                  ///< the compliance if it is a number, else 1 / stiffness [m/N]
     Vector3<N> displacement;  ///< [m]
     YesNo moves;              ///< whether the force is above the tolerance
     YesNo may_overshoot;      ///< whether the displacement may be unstable, by the stiffness bound

@@ -75,7 +75,7 @@ struct ToolContact {
     void prevent_tunnelling(Context& context) const noexcept;
     [[nodiscard]] bool has_new_overlap(const Context& context) const noexcept;
 
-    [[nodiscard]] ContactTool<Scalar> shape() const noexcept {
+    [[nodiscard]] ToolShape<Scalar> shape() const noexcept {
         return {tool.position, tool.axis, contact.axis_point, contact.radius};
     }
     [[nodiscard]] static auto packs(Context& context) noexcept {
@@ -126,15 +126,15 @@ namespace detail {
 inline constexpr int max_push_passes = 8;
 
 // Largest number of contact passes before vertices are updated again: without, and with deep penetration.
-inline constexpr int all_contact_passes = 8, deep_contact_passes = 16;
+inline constexpr int max_passes = 8, deep_contact_passes = 16;
 
 /// Largest number of passes without deep penetration. With few points each carries a large part of the force, and more
 /// passes reduce its error. Points that are `stiff` (beside fixed corners, or several of a shaft on one triangle)
 /// converge slowly and get all passes.
 [[nodiscard]] constexpr int max_contact_passes(std::size_t points, bool stiff) noexcept {
-    constexpr int least = 2, points_of_all_passes = 32;
-    if (stiff || points == 0) return all_contact_passes;
-    return std::clamp(points_of_all_passes / static_cast<int>(points), least, all_contact_passes);
+    constexpr int least = 2, point_passes = 32;
+    if (stiff || points == 0) return max_passes;
+    return std::clamp(point_passes / static_cast<int>(points), least, max_passes);
 }
 
 }  // namespace detail
@@ -152,10 +152,8 @@ void ToolContact<Scalar>::begin(Context& context) const noexcept {
     sum_support_forces(context, context.constraint());
     const auto out = direction_out_of_support(context);
     if (contact.tunnelled && !out) carry_with_tool(context);
-    list_candidates(context);
-    // A tool penetrates fixed and shared vertices at equilibrium, too.
-    const auto stays = [&](Index v) { return context.fixed(v) || context.contacts().shared.contains(v); };
-    const bool held = std::any_of(contact.corners.begin(), contact.corners.end(), stays);
+    list_candidates(context);                                 // after that: `go_back` does not undo it
+    const bool held = is_on_fixed(context, contact.corners);  // a tool penetrates these at equilibrium, too
     if (!contact.tunnelled && !out && !held && contact.gap < -negligible_distance(context, contact.corners[0])) {
         clear_contact_point(context);
     }
@@ -296,7 +294,8 @@ void ToolContact<Scalar>::stay_on_side(const Context& context, ContactPoint<Scal
     if (point.by_plane) point.normal = direction<Scalar>(contact.side * area, point.normal);
 }
 
-// Applies the points' forces and packs the points.
+// Applies the points' forces of the last step, from which those of this one go on, and packs the points. First the
+// forces: this marks the corners as forced, on which `add_forces` relies.
 template <Real Scalar>
 void ToolContact<Scalar>::pack_points(Context& context) const noexcept {
     auto& contacts = context.contacts();
@@ -385,7 +384,7 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
     if (!contact.touching()) return false;
     const bool takes_turns = context.contacts().several_on_fixed;  // then another constraint's pass comes next
     if (takes_turns) sum_support_forces(context);
-    Scalar first = 0;  // largest change of a force in the first pass [N]
+    Scalar first_change = 0;  // largest change of a force in the first pass [N]
     bool released = false;
     const auto points = std::as_const(context).points();
     const bool on_fixed = std::any_of(points.begin(), points.end(), [](const auto& point) { return point.on_fixed; });
@@ -395,9 +394,10 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
         const auto pass = solve_contacts(context.rows(), context.contacts(), shape(), packs(context), i > 0);
         deep = pass.deep && !takes_turns;
         released = released || pass.released;
-        if (i == 0) first = pass.largest;
-        // Stops if the vertices need updates first.
-        if (!(i + 1 < most ? pass.largest > first / 2 : pass.deep)) break;
+        if (i == 0) first_change = pass.largest;
+        // While forces change by more than half of that; then only while a penetration is deep.
+        const bool needs_more = i + 1 < most ? pass.largest > first_change / 2 : pass.deep;
+        if (!needs_more) break;
     }
     for (int i = 0; deep && i < detail::max_push_passes; ++i)
         deep = push_out(context.rows(), context.contacts(), shape(), packs(context));
@@ -407,16 +407,17 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
     apply_forces(context.rows(), context.contacts(), packs(context));
     prevent_tunnelling(context);
     if (takes_turns) context.contacts().packs.unpack(context.contacts().points.items());
-    return first > 0 || released || has_new_overlap(context);
+    return first_change > 0 || released || has_new_overlap(context);
 }
 
-// Whether a triangle that was out of range at the start of the step, and has no contact point, penetrates now.
+// Whether a triangle that was out of range at the start of the step, and has no contact point, penetrates now: the step
+// has not converged, and the tracker adds the point in the next tick.
 template <Real Scalar>
 bool ToolContact<Scalar>::has_new_overlap(const Context& context) const noexcept {
     if (on_support(context)) return false;  // contact is at this point only
     const int features = feature_pairs(tool);
     const auto points = context.points();
-    auto next = points.begin();  // in the same order
+    auto next = points.begin();  // in the order of the triangles
     for (const auto& listed : contact.triangles) {
         for (int feature = 0; feature < features; ++feature) {
             if (next != points.end() && next->triangle == listed.triangle && next->feature == feature) {
