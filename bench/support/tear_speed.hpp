@@ -12,6 +12,7 @@
 
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/model/tearable_springs.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
 #include <membrane/tear/tearing.hpp>

@@ -13,7 +13,7 @@
 #include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/tearable_springs.hpp>
 #include <membrane/model/volume_springs.hpp>
-#include <membrane/solve/constraints.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/shapes.hpp>
 #include <membrane/tear/tearing.hpp>

@@ -31,6 +31,7 @@
 #include <membrane/solve/propagation_queue.hpp>
 #include <membrane/solve/step_rule.hpp>
 #include <membrane/solve/constraints.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/solve/quasi_static.hpp>
 

@@ -4,6 +4,7 @@
 #include <membrane/model/mass_spring_network.hpp>
 #include <membrane/model/spring_law.hpp>
 #include <membrane/model/volume_springs.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
 

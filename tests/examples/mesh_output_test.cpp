@@ -11,6 +11,7 @@
 
 #include <Eigen/Geometry>
 
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/solve/constraints.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 
 #include <algorithm>
 #include <array>

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <membrane/model/moving_foundation.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"

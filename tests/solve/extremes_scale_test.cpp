@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"

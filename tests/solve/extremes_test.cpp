@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/surface/normals.hpp>
 #include <membrane/surface/shapes.hpp>
 

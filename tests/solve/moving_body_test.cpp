@@ -13,6 +13,7 @@
 #include <membrane/haptics/rest_contact.hpp>
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/model/moving_foundation.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/moving_body.hpp>
 #include <membrane/surface/shapes.hpp>

@@ -14,7 +14,7 @@
 #include <membrane/core/thread_pool.hpp>
 #include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/moving_foundation.hpp>
-#include <membrane/solve/constraints.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>

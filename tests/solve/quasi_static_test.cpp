@@ -13,6 +13,7 @@
 
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/model/moving_foundation.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
 

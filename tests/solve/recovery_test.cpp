@@ -12,6 +12,7 @@
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/contact/grasper.hpp>
 #include <membrane/haptics/device.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
 

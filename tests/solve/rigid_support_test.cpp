@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <membrane/contact/contact_tracker.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>

@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <vector>
 
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
 

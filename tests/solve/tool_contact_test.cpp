@@ -13,6 +13,7 @@
 #include <Eigen/Geometry>
 
 #include <membrane/contact/contact_tracker.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
 

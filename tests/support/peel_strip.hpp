@@ -9,6 +9,7 @@
 #include <membrane/model/cohesive_springs.hpp>
 #include <membrane/model/material.hpp>
 #include <membrane/model/spring_stiffness.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/quasi_static.hpp>
 
 #include "support/meshes.hpp"

@@ -14,6 +14,7 @@
 #include <membrane/model/material.hpp>
 #include <membrane/model/spring_stiffness.hpp>
 #include <membrane/model/tearable_springs.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/tear/tearing.hpp>
 #include <membrane/tissue/tissue.hpp>

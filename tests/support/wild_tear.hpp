@@ -10,6 +10,7 @@
 #include <membrane/contact/grasper.hpp>
 #include <membrane/model/cohesive_springs.hpp>
 #include <membrane/model/foundation_layer.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_friction.hpp>
 #include <membrane/surface/normals.hpp>

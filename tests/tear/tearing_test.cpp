@@ -19,6 +19,7 @@
 #include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/moving_foundation.hpp>
 #include <membrane/model/spring_stiffness.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-#include <membrane/solve/constraints.hpp>
+#include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/tool_contact.hpp>
 
 /// The description of a constraint, independent of its type: for Newton's method, the error bound and trials.
