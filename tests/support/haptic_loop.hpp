@@ -19,7 +19,7 @@
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/haptics/virtual_coupling.hpp>
 
-#include "openhaptics/units.hpp"
+#include "../../examples/openhaptics/units.hpp"
 #include "support/whole_loop.hpp"
 
 /// The complete loop of a hand, and what can go wrong in it.
