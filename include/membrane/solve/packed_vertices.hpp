@@ -82,7 +82,9 @@ class PackedVertices {
     /// The first pack whose first vertex is at position `first` or later in pack order.
     [[nodiscard]] std::size_t pack_from(std::size_t first) const noexcept {
         const auto packs = packs_.items();
-        return static_cast<std::size_t>(std::ranges::lower_bound(packs, first, {}, &Pack::first) - packs.begin());
+        const auto begins_before = [](const Pack& pack, std::size_t at) { return pack.first < at; };
+        return static_cast<std::size_t>(std::lower_bound(packs.begin(), packs.end(), first, begins_before) -
+                                        packs.begin());
     }
 
     /// The end of the group of pack `p`, at most `end`.
