@@ -341,9 +341,8 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     sweep(scene, acting);
     if (advances() && !evaluate_residuals(scene)) {
         contacts_.reset_points();  // a force of the last step may have diverged
-        rows_.restore(start);
-        const bool bounded = evaluate_residuals(scene);  // if not even at the start positions: the input is invalid
-        report_.status = bounded ? StepStatus::unstable : StepStatus::invalid_input;
+        rows_.restore(start);      // if they are not bounded there either, the input is invalid
+        report_.status = evaluate_residuals(scene) ? StepStatus::unstable : StepStatus::invalid_input;
     }
     if (advances() && !acting.react(reactions_)) report_.status = StepStatus::unstable;
     if (!advances()) return refuse_step(report_.status);
