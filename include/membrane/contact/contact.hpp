@@ -52,8 +52,7 @@ struct Contact {
     // Valid until the tracker's next update.
     std::span<const ContactPoint<Scalar>>
         points;  ///< one for each pair of triangle and tool feature within `detection_distance`
-    std::span<const ContactTriangle>
-        triangles;  ///< within `detection_distance`, around the active one, on a path through
+    std::span<const ContactTriangle> triangles;   ///< within `detection_distance`, by the active one, on a path through
     std::span<const ContactTriangle> candidates;  ///< `triangles`, then those around them
     bool has_all_points = true;  ///< false if `points` exceeded its capacity: a step refuses this contact
     bool closed = false;         ///< whether the surface is closed: its back is its inside

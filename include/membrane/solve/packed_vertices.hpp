@@ -32,11 +32,11 @@ namespace membrane {
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
-/// What constraints are to the vertices of an update.
+/// How constraints act on the vertices of an update.
 enum class Constrained : unsigned char {
-    no,          ///< they have no force on them
-    by_force,    ///< their forces are added
-    in_contact,  ///< as vertices of layer 0: their forces are added, and the response of each vertex is stored for them
+    no,          ///< no constraint has a force on them
+    by_force,    ///< the forces of constraints are added
+    in_contact,  ///< layer 0: as `by_force`, and the response of each vertex is stored, for constraints to use
 };
 
 /// The vertices of a queue, and then others, in packs of one vertex for each lane. A pack stores for each vertex its
