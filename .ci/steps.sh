@@ -12,13 +12,26 @@ stopped() {
 }
 trap stopped EXIT
 
-# step NAME COMMAND...
+# count_processor_time: sets `processor_time` to the seconds that this shell's commands have taken. In a pipe it would
+# count that of another shell.
+count_processor_time() {
+    local times=$passed.$BASHPID
+    times > "$times"
+    processor_time=$(awk -F '[ms ]+' 'END { printf "%d", 60 * $1 + $2 + 60 * $3 + $4 }' "$times")
+    rm "$times"
+}
+
+# step NAME COMMAND...: with its time, and the time of processors that it took.
 step() {
-    local begun=$SECONDS
+    local begun=$SECONDS before processor_time
+    count_processor_time
+    before=$processor_time
     current=$1
     printf '\n=== %s\n' "$current"
     "${@:2}"
-    printf '%5d s  %s\n' "$((SECONDS - begun))" "$1" | tee --append "$passed"
+    count_processor_time
+    printf '%5d s, %5d of a processor  %s\n' $((SECONDS - begun)) $((processor_time - before)) "$1" |
+        tee --append "$passed"
 }
 
 # side_by_side STEPS STEPS: two functions of steps at the same time, since a core is idle while the other compiles the

@@ -2,14 +2,14 @@
 #include <string>
 #include <vector>
 
-#include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/tissue/bending.hpp>
 #include <membrane/tissue/bending_triangles.hpp>
 #include <membrane/tissue/fibres.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
 #include <membrane/tissue/fung.hpp>
 #include <membrane/tissue/neo_hookean.hpp>
 #include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
 

@@ -132,7 +132,7 @@ const bool added = [] {
 
 void ask_tree(const Loop& loop) {
     benchmark::DoNotOptimize(loop.tree.closest_point(loop.x, loop.tool.position));
-    loop.tree.overlap_sphere(loop.x, loop.tool.position, loop.contact.detection_distance,
+    loop.tree.overlap_sphere(loop.x, loop.tool.position, loop.contact.patch.detection_distance,
                              [](Index f) { benchmark::DoNotOptimize(f); });
 }
 
@@ -148,7 +148,7 @@ void contact(benchmark::State& state, bool tracked) {
         });
         if (!tracked) time = seconds([&] { ask_tree(loop); });
         state.SetIterationTime(time);
-        touched += static_cast<double>(loop.contact.triangles.size());
+        touched += static_cast<double>(loop.contact.patch.triangles.size());
     }
     loop.validate();
     state.counters["touched"] = benchmark::Counter(touched, benchmark::Counter::kAvgIterations);

@@ -9,7 +9,7 @@
 #include <memory>
 #include <vector>
 
-#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 #include "support/bullet_scene.hpp"
 #include "support/slide.hpp"
@@ -49,7 +49,7 @@ template <Real Scalar>
 double penetration_of(const SlidingLoop<Scalar>& loop) {
     const Vector3 centre = loop.tool.position.template cast<double>();
     double nearest = std::numeric_limits<double>::infinity();
-    for (const auto& touched : loop.contact.triangles) {
+    for (const auto& touched : loop.contact.patch.triangles) {
         const auto [a, b, c] = membrane::triangle_at(loop.x, touched.corners);
         const membrane::Triangle<double> triangle{a.template cast<double>(), b.template cast<double>(),
                                                   c.template cast<double>()};

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include <membrane/model/material.hpp>
+#include <membrane/tissue/material.hpp>
 
 #include "support/tissue_experiments.hpp"
 #include "support/tissue_strip.hpp"

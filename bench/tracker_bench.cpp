@@ -25,7 +25,7 @@ void tree(benchmark::State& state, const Path& path) {
         touched.clear();
         benchmark::DoNotOptimize(loop.tree.closest_point(loop.x, loop.tool.position));
         loop.tree.overlap_capsule(loop.x, loop.tool.position, loop.tool.position + loop.tool.axis,
-                                  loop.contact.detection_distance, [&](Index f) { touched.try_push_back(f); });
+                                  loop.contact.patch.detection_distance, [&](Index f) { touched.try_push_back(f); });
     };
     for (auto _ : state) {
         loop.frame();
@@ -37,7 +37,7 @@ void tree(benchmark::State& state, const Path& path) {
     ask();
     for (const Index f : touched.items()) {
         const auto is_f = [&](const auto& seen) { return seen.triangle == f; };
-        require(std::any_of(loop.contact.triangles.begin(), loop.contact.triangles.end(), is_f),
+        require(std::any_of(loop.contact.patch.triangles.begin(), loop.contact.patch.triangles.end(), is_f),
                 "the tracker must find the triangles of the tree");
     }
 }

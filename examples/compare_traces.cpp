@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include <membrane/haptics/recording.hpp>
 #include <membrane/membrane.hpp>
+#include <membrane/replay/recording.hpp>
 
 #include "support/recordings.hpp"
 #include "support/specimen.hpp"

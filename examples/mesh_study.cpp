@@ -6,7 +6,7 @@
 
 #include <membrane/accuracy/equilibrium.hpp>
 #include <membrane/membrane.hpp>
-#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 const double tool_radius = 2e-3, depth = 1e-3;  // [m]
 

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/haptics/script.hpp>
 #include <membrane/membrane.hpp>
+#include <membrane/replay/script.hpp>
 
 #include "support/specimen.hpp"
 

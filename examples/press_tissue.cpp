@@ -10,8 +10,8 @@
 
 #include <membrane/membrane.hpp>
 #include <membrane/meshing/distmesh.hpp>
-#include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 // [tissue]
 #include <membrane/tissue/bending.hpp>
 #include <membrane/tissue/pressure.hpp>

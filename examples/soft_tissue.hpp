@@ -11,14 +11,14 @@
 #include <thread>
 #include <vector>
 
-#include <membrane/core/initial_state.hpp>
-#include <membrane/core/snapshot.hpp>
 #include <membrane/haptics/handover.hpp>
 #include <membrane/membrane.hpp>
 #include <membrane/mesh_check/repair.hpp>
-#include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/recommended_layers.hpp>
-#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/replay/initial_state.hpp>
+#include <membrane/replay/snapshot.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
+#include <membrane/tissue/recommended_layers.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 /// One vertex as the engine sends it to the graphics card.
 struct EngineVertex {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include <membrane/haptics/handover.hpp>
-#include <membrane/haptics/simulated_hand.hpp>
 #include <membrane/membrane.hpp>
+#include <membrane/replay/simulated_hand.hpp>
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 

@@ -14,13 +14,13 @@
 #include <membrane/accuracy/equilibrium.hpp>
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/contact/facet_correction.hpp>
-#include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/shapes.hpp>
 #include <membrane/tissue/bending.hpp>
 #include <membrane/tissue/bending_triangles.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
 #include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
 

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include <membrane/contact/aabb_tree.hpp>
-#include <membrane/model/tearable_springs.hpp>
 #include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 #include <membrane/tear/tearing.hpp>
 #include <membrane/tissue/tissue.hpp>
 

@@ -7,9 +7,9 @@
 
 #include <membrane/membrane.hpp>
 #include <membrane/meshing/distmesh.hpp>
-#include <membrane/model/material.hpp>
 #include <membrane/tear/tearing.hpp>
 #include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/material.hpp>
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include <membrane/model/material.hpp>
+#include <membrane/tissue/material.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
 
 #include "support/peel_scene.hpp"

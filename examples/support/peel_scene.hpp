@@ -9,8 +9,8 @@
 #include <vector>
 
 #include <membrane/haptics/device.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 /// A membrane that forceps peel off the body under it.
 namespace examples {

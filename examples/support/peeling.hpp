@@ -5,9 +5,9 @@
 #include <vector>
 
 #include <membrane/membrane.hpp>
-#include <membrane/model/cohesive_springs.hpp>
-#include <membrane/model/material.hpp>
-#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/tear/cohesive_springs.hpp>
+#include <membrane/tissue/material.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 #include "support/fluid.hpp"
 #include "support/loop_options.hpp"

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include <membrane/haptics/recording_file.hpp>
+#include <membrane/replay/recording_file.hpp>
 
 #include "support/plot.hpp"
 

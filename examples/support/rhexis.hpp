@@ -10,13 +10,13 @@
 #include <string>
 #include <vector>
 
-#include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/tearable_springs.hpp>
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 #include <membrane/tear/tearing.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
 
 #include "support/peel_scene.hpp"
 #include "support/specimen.hpp"

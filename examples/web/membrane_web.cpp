@@ -132,7 +132,7 @@ class Loop {
     }
     [[nodiscard]] val tracked_triangles() {
         triangles_.clear();
-        for (const auto& triangle : session_.moment().contact.triangles) triangles_.push_back(triangle.triangle);
+        for (const auto& triangle : session_.moment().contact.patch.triangles) triangles_.push_back(triangle.triangle);
         return view(triangles_);
     }
 
@@ -300,16 +300,19 @@ EMSCRIPTEN_BINDINGS(membrane) {
         .field("volumeSprings", &Settings::volume_springs);
     using Tool = membrane::Tool<double>;
     value_object<Tool>("Tool").field("position", &Tool::position).field("radius", &Tool::radius);
+    using Patch = membrane::ContactPatch<double>;
+    value_object<Patch>("ContactPatch")
+        .field("axisPoint", &Patch::axis_point)
+        .field("detectionDistance", &Patch::detection_distance)
+        .field("radius", &Patch::radius);
     using Contact = membrane::Contact<double>;
     value_object<Contact>("Contact")  // what an equilibrium needs of it
         .field("touching", &touching, &set_touching)
         .field("corners", &Contact::corners)
         .field("point", &Contact::point)
         .field("normal", &Contact::normal)
-        .field("axisPoint", &Contact::axis_point)
         .field("gap", &Contact::gap)
-        .field("detectionDistance", &Contact::detection_distance)
-        .field("radius", &Contact::radius);
+        .field("patch", &Contact::patch);
     using Grasp = membrane::Grasp<double>;
     value_object<Grasp>("Grasp")
         .field("triangle", &Grasp::triangle)

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
-#include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/moving_foundation.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

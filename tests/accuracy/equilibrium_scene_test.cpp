@@ -36,10 +36,10 @@ Contact<double> contact_above() {
     contact.phase = ContactPhase::ongoing;
     contact.corners = corners;
     contact.normal = {0, 0, 1};
-    contact.axis_point = {0, 0, 0.1};
+    contact.patch.axis_point = {0, 0, 0.1};
     contact.gap = -0.2;
-    contact.detection_distance = 0.01;
-    contact.radius = 0.3;
+    contact.patch.detection_distance = 0.01;
+    contact.patch.radius = 0.3;
     return contact;
 }
 
@@ -154,7 +154,7 @@ TEST_CASE("a scene refuses what is not valid", "[equilibrium_scene]") {
           "equilibrium: x of the tool's position of constraint 5 must be finite [m], got nan");
     CHECK(refused(press(Tool<double>{.axis = {not_a_number, 0, 0}}, contact)) ==
           "equilibrium: x of the tool's axis of constraint 5 must be finite [m], got nan");
-    contact.radius = 0;
+    contact.patch.radius = 0;
     CHECK(refused(press(Tool<double>{}, contact)) ==
           "equilibrium: radius of the contact of constraint 5 must be finite and positive [m], got 0");
     contact = contact_above();

@@ -645,10 +645,10 @@ TEST_CASE("equilibrium in floats is the one in doubles, as near as floats come",
     touching.corners = contact.corners;
     touching.point = contact.point.cast<float>();
     touching.normal = contact.normal.cast<float>();
-    touching.axis_point = contact.axis_point.cast<float>();
+    touching.patch.axis_point = contact.patch.axis_point.cast<float>();
     touching.gap = static_cast<float>(contact.gap);
-    touching.detection_distance = static_cast<float>(contact.detection_distance);
-    touching.radius = static_cast<float>(contact.radius);
+    touching.patch.detection_distance = static_cast<float>(contact.patch.detection_distance);
+    touching.patch.radius = static_cast<float>(contact.patch.radius);
 
     const auto rest = sphere.rest({}, press(stroke.at(1), contact), load<double>(sphere.corners(9), weights, force));
     const auto in_float = equilibrium(mesh.positions(), mesh, network, foundation, {}, press(tool, touching),

@@ -14,10 +14,10 @@
 #include <membrane/accuracy/equilibrium.hpp>
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/meshing/distmesh.hpp>
-#include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/material.hpp>
-#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
+#include <membrane/tissue/material.hpp>
 #include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
 

@@ -10,10 +10,10 @@
 #include <membrane/accuracy/equilibrium.hpp>
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/meshing/distmesh.hpp>
-#include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
 

@@ -4,11 +4,11 @@
 #include <numbers>
 
 #include <membrane/accuracy/equilibrium.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/shapes.hpp>
 #include <membrane/tissue/pressure.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
 

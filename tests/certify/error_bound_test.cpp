@@ -13,10 +13,10 @@
 #include <membrane/accuracy/tangent_stiffness.hpp>
 #include <membrane/certify/factored_convexity.hpp>
 #include <membrane/model/moving_foundation.hpp>
-#include <membrane/model/tearable_springs.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -470,7 +470,7 @@ TEST_CASE("what no bound is known for is said, and why", "[error_bound]") {
     CHECK(status(x, press(Tool<double>{}, contact)) == BoundStatus::certified);
     contact.phase = ContactPhase::ongoing;
     contact.corners = {0, 1, 2};
-    contact.radius = 0.1;
+    contact.patch.radius = 0.1;
     CHECK(status(x, press(Tool<double>{.radius = 0.1}, contact)) == BoundStatus::contact);
 
     ErrorBound hasty(sphere.network, {.cg_iterations = 1});

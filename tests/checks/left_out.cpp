@@ -16,7 +16,7 @@
 #include <vector>
 
 #include <membrane/membrane.hpp>
-#include <membrane/model/tearable_springs.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 #include <membrane/tear/tearing.hpp>
 #include <membrane/tissue/tissue.hpp>
 

@@ -18,10 +18,10 @@
 #include <membrane/certify/error_bound.hpp>
 #include <membrane/haptics/force_limits.hpp>
 #include <membrane/membrane.hpp>
-#include <membrane/model/material.hpp>
 #include <membrane/surface/moving_body.hpp>
 #include <membrane/tear/tearing.hpp>
 #include <membrane/tissue/fung.hpp>
+#include <membrane/tissue/material.hpp>
 
 // A membrane, and its state.
 extern const membrane::TriangleMesh<double> mesh;
@@ -186,15 +186,12 @@ extern const Pool pool;
 extern const membrane::ContactPoint<double> point;
 // [/core/fixed_vector]
 
-// [core/in_lanes]
-extern const membrane::VolumeSpring<double> spring;
-// [/core/in_lanes]
-
 // [core/lane_points]
 extern const membrane::Index* const begins;
 // [/core/lane_points]
 
 // [core/lanes]
+extern const membrane::VolumeSpring<double> spring;
 extern const membrane::Lanes<float> x, y;
 // [/core/lanes]
 
@@ -230,14 +227,14 @@ extern membrane::Points<double> shown;
 extern membrane::Triangles indices;
 // [/haptics/handover]
 
-// [haptics/recording_file]
+// [replay/recording_file]
 extern membrane::Recorder<double> recorder;
 extern std::ifstream stream;
-// [/haptics/recording_file]
+// [/replay/recording_file]
 
-// [haptics/simulated_hand]
+// [replay/simulated_hand]
 extern const membrane::Vector3<double> above, below;
-// [/haptics/simulated_hand]
+// [/replay/simulated_hand]
 
 // [mesh_check/box_pairs]
 extern const std::vector<membrane::Aabb<double>> boxes;
@@ -276,10 +273,10 @@ extern const MyElement element;
 extern const membrane::Corners<double, 3> corners;
 // [/model/element]
 
-// [model/tearable_springs]
+// [tear/tearable_springs]
 extern const membrane::TriangleMesh<double> sheet;
 extern const membrane::NetworkOptions<double> options;
-// [/model/tearable_springs]
+// [/tear/tearable_springs]
 
 // [solve/active_vertices]
 bool is_balanced(membrane::Index v);
@@ -290,9 +287,9 @@ extern const double pressure, area;
 extern const membrane::Vector3<double> outward;
 // [/solve/constraint_context]
 
-// [solve/constraint_term]
+// [accuracy/constraint_term]
 extern const membrane::ToolContact<double> constraint;
-// [/solve/constraint_term]
+// [/accuracy/constraint_term]
 
 // [solve/contact_pack]
 extern membrane::ContactState<double> state;

@@ -2,7 +2,7 @@
 // A network of springs that cannot be doubled, in a membrane that tears.
 // expect: follow: this network .* does not tear: make it a TearableSprings
 // expect: MassSpringNetwork<double
-#include <membrane/model/tearable_springs.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 #include <membrane/tear/tearing.hpp>
 
 #ifdef CORRECT

@@ -32,7 +32,7 @@ TEST_CASE("over a sheet, gap and normal are the height's, on either side") {
         CHECK(std::abs(contact.gap - (height - radius)) < 1e-12);
         CHECK((contact.normal - Vector3<double>(0, 0, side)).norm() < 1e-9);
         CHECK((contact.point - foot).norm() < 1e-12);
-        CHECK(contact.side == side);
+        CHECK(contact.patch.side == side);
         CHECK(contact.corners == surface.corners(f));
     }
 }
@@ -41,7 +41,7 @@ TEST_CASE("beside a border the tool is simply beside it, whichever side it was o
     const Tool<double> tool{.position = {0.55, 0.1, -0.02}, .radius = 0.1};
     const Index f = surface.walk_to_closest(mesh.positions(), 0, tool.position);
     const auto contact = membrane::contact_in(surface, mesh.positions(), f, tool, 0.1, 1.0);
-    CHECK(contact.side == -1);
+    CHECK(contact.patch.side == -1);
     CHECK(std::abs(contact.gap - (std::hypot(0.05, 0.02) - 0.1)) < 1e-12);
     CHECK(contact.normal.x() > 0);
 }
@@ -54,7 +54,7 @@ TEST_CASE("a shaft stuck through counts by its lower end") {
         found = true;
         const auto contact = membrane::contact_in(surface, mesh.positions(), f, shaft, 0.01, 1.0);
         CHECK(std::abs(contact.gap - (-0.2 - 0.01)) < 1e-12);
-        CHECK(std::abs(contact.axis_point.z() + 0.2) < 1e-12);
+        CHECK(std::abs(contact.patch.axis_point.z() + 0.2) < 1e-12);
     }
     CHECK(found);
 }
@@ -82,9 +82,9 @@ TEST_CASE("where a point passed, the contact is what it passed") {
     const auto contact = membrane::contact_where_passed(surface, mesh.positions(), 1, barycentric, from, to, 1.0);
     CHECK(contact.triangle == 1);
     CHECK(std::abs(contact.gap + 0.4) < 1e-12);
-    CHECK(contact.tunnelled);
-    CHECK(contact.previous_axis_point == from);
-    CHECK(contact.axis_point == to);
+    CHECK(contact.patch.tunnelled);
+    CHECK(contact.patch.previous_axis_point == from);
+    CHECK(contact.patch.axis_point == to);
     CHECK((contact.point - membrane::point_at(surface.triangle(mesh.positions(), 1), barycentric)).norm() < 1e-15);
     CHECK(contact.normal.z() == 1);
 }

@@ -14,8 +14,8 @@ TEMPLATE_TEST_CASE("no contact touches nothing", "[contact]", TEST_SCALARS) {
     CHECK_FALSE(contact.touching());
     CHECK(contact.triangle == no_index);
     CHECK(contact.corners == std::array<Index, 3>{no_index, no_index, no_index});
-    CHECK(contact.triangles.empty());
-    CHECK(contact.points.empty());
+    CHECK(contact.patch.triangles.empty());
+    CHECK(contact.patch.points.empty());
     CHECK(contact.depth == 0);
     CHECK(contact.normal == Vector3<S>(0, 0, 0));
     STATIC_REQUIRE(noexcept(Contact<S>::none()));
@@ -39,22 +39,22 @@ TEMPLATE_TEST_CASE("a contact is valid if its numbers are, or if it touches noth
     contact.gap = bad;
     CHECK(is_valid(contact));
     contact.phase = ContactPhase::began;
-    contact.radius = 1;
+    contact.patch.radius = 1;
     CHECK_FALSE(is_valid(contact));
     contact.gap = 0;
     CHECK(is_valid(contact));
-    for (auto* numbers :
-         {&contact.barycentric, &contact.point, &contact.normal, &contact.axis_point, &contact.previous_axis_point}) {
+    for (auto* numbers : {&contact.barycentric, &contact.point, &contact.normal, &contact.patch.axis_point,
+                          &contact.patch.previous_axis_point}) {
         numbers->z() = bad;
         CHECK_FALSE(is_valid(contact));
         numbers->z() = 0;
     }
-    for (S* number : {&contact.detection_distance, &contact.radius}) {
+    for (S* number : {&contact.patch.detection_distance, &contact.patch.radius}) {
         *number = bad;
         CHECK_FALSE(is_valid(contact));
         *number = 1;
     }
     CHECK(is_valid(contact));
-    contact.radius = 0;
+    contact.patch.radius = 0;
     CHECK_FALSE(is_valid(contact));
 }

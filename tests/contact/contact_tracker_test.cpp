@@ -100,14 +100,14 @@ TEST_CASE("the tracker agrees with a search of the whole surface along random tr
                 continue;
             }
             ++contact_ticks;
-            if (contact.tunnelled) continue;
+            if (contact.patch.tunnelled) continue;
             CAPTURE(seed, tick, tool.radius, gap);
             REQUIRE(std::abs(contact.gap - gap) <= 1e-12);
             REQUIRE(std::abs((contact.point - nearest.point).norm()) <= 1e-6);
             ++agreements;
             if (tick % 5 != 0) continue;
             std::vector<Index> listed;
-            for (const auto& touched : contact.triangles) listed.push_back(touched.triangle);
+            for (const auto& touched : contact.patch.triangles) listed.push_back(touched.triangle);
             tree.overlap_sphere(x, tool.position, tool.radius,
                                 [&](Index f) { REQUIRE(std::find(listed.begin(), listed.end(), f) != listed.end()); });
         }
@@ -232,7 +232,7 @@ TEST_CASE("a tool that a surface has not yielded to stays behind it, until it do
         CAPTURE(tick);
         REQUIRE((report.status == membrane::StepStatus::advanced) == !refused);
         if (contact.touching()) REQUIRE(contact.normal.z() > 0);
-        if (refused && tick > 8) REQUIRE(contact.tunnelled);
+        if (refused && tick > 8) REQUIRE(contact.patch.tunnelled);
         if (!refused && contact.touching()) {
             REQUIRE(std::abs(winding_number(x, mesh.triangles(), tool.position)) < 0.5);
         }
@@ -400,10 +400,10 @@ TEST_CASE("an open sheet is touched from either side, and the side of first cont
             CAPTURE(side, tick);
             CHECK(contact.touching() == (height < 0.05));
             if (!contact.touching()) continue;
-            CHECK_FALSE(contact.closed);
-            CHECK(contact.side == side);
+            CHECK_FALSE(contact.patch.closed);
+            CHECK(contact.patch.side == side);
             CHECK(contact.normal.z() * side > 0.999);
-            CHECK(contact.tunnelled == (height < 0));
+            CHECK(contact.patch.tunnelled == (height < 0));
             CHECK(std::abs(contact.depth - (0.05 - height)) < 1e-12);
         }
     }
@@ -428,17 +428,17 @@ TEMPLATE_TEST_CASE("a shaft across a valley of a sheet, one end beyond the borde
                     AabbTree<S> tree(mesh);
                     ContactTracker<S> tracker(mesh);
                     Points<S> x = mesh.positions();
-                    REQUIRE(tracker.update(tree, x, tool).side == side);  // it lies on the flat sheet
-                    for (Eigen::Index v = 0; v < x.cols(); ++v) {         // highest at the border and at the inner end
+                    REQUIRE(tracker.update(tree, x, tool).patch.side == side);  // it lies on the flat sheet
+                    for (Eigen::Index v = 0; v < x.cols(); ++v) {  // highest at the border and at the inner end
                         const S from_border = S(0.5) - border * x(1, v);
                         x(2, v) = side * S(0.06) * std::cos(2 * std::numbers::pi_v<S> * from_border / S(0.8));
                     }
                     tree.refit(x);
                     const auto contact = tracker.update(tree, x, tool);
                     REQUIRE(contact.phase == ContactPhase::ongoing);
-                    CHECK(contact.tunnelled);
-                    CHECK(contact.side == side);
-                    CHECK(membrane::norm<S>(contact.axis_point - inner) < S(1e-6));
+                    CHECK(contact.patch.tunnelled);
+                    CHECK(contact.patch.side == side);
+                    CHECK(membrane::norm<S>(contact.patch.axis_point - inner) < S(1e-6));
                     const auto nearest = tree.closest_point(x, inner);
                     CHECK(contact.gap < S(1e-5) - std::sqrt(nearest.squared_distance) - tool.radius);
                 }
@@ -458,8 +458,8 @@ TEST_CASE("a tool that flies through in one tick touches where it went through")
         CHECK_FALSE(at(0.1, 1).touching());
         const auto contact = at(-0.1, -1e5);
         REQUIRE(contact.phase == ContactPhase::began);
-        CHECK(contact.tunnelled);
-        CHECK(contact.side == side);
+        CHECK(contact.patch.tunnelled);
+        CHECK(contact.patch.side == side);
         CHECK(contact.normal.z() * side == 1);
         CHECK(std::abs(contact.point.x() - 0.1) < 1e-5);
         CHECK(contact.depth > 0.9e5);
@@ -484,7 +484,7 @@ TEST_CASE("a capsule touches with its ends, its middle and what it is stuck thro
         if (touched.empty()) continue;
         REQUIRE(contact.touching());
         for (const Index f : touched) {
-            CHECK(std::any_of(contact.triangles.begin(), contact.triangles.end(),
+            CHECK(std::any_of(contact.patch.triangles.begin(), contact.patch.triangles.end(),
                               [f](const auto& listed) { return listed.triangle == f; }));
         }
     }
@@ -528,13 +528,15 @@ std::vector<membrane::ContactPoint<S>> points_of(const TriangleMesh<S>& mesh, co
     std::vector<membrane::ContactPoint<S>> points;
     const auto& all = mesh.triangles();
     for (Index f = 0; f < mesh.triangle_count(); ++f) {
-        const bool touched = std::any_of(contact.triangles.begin(), contact.triangles.end(),
+        const bool touched = std::any_of(contact.patch.triangles.begin(), contact.patch.triangles.end(),
                                          [f](const auto& listed) { return listed.triangle == f; });
         const std::array<Index, 3> corners{all(0, f), all(1, f), all(2, f)};
         const auto triangle = membrane::triangle_at(mesh.positions(), corners);
         for (int feature = 0; feature < membrane::feature_pairs(tool); ++feature) {
-            const auto point = membrane::contact_point(f, corners, triangle, tool, feature, contact.radius);
-            if (!point || !(contact.tunnelled ? touched : point->gap + contact.radius <= contact.detection_distance))
+            const auto point = membrane::contact_point(f, corners, triangle, tool, feature, contact.patch.radius);
+            if (!point ||
+                !(contact.patch.tunnelled ? touched
+                                          : point->gap + contact.patch.radius <= contact.patch.detection_distance))
                 continue;
             points.push_back(*point);
         }
@@ -560,10 +562,10 @@ TEMPLATE_TEST_CASE("the contact points are those of all triangles within reach, 
         ContactTracker<S> tracker(mesh);
         const auto contact = tracker.update(tree, mesh.positions(), tool);
         if (!contact.touching()) continue;
-        tunnelled += contact.tunnelled ? 1 : 0;
-        REQUIRE(contact.has_all_points);
+        tunnelled += contact.patch.tunnelled ? 1 : 0;
+        REQUIRE(contact.patch.has_all_points);
         auto expected = points_of(mesh, contact, tool);
-        std::vector<membrane::ContactPoint<S>> found(contact.points.begin(), contact.points.end());
+        std::vector<membrane::ContactPoint<S>> found(contact.patch.points.begin(), contact.patch.points.end());
         const auto in_order = [](const auto& p, const auto& q) {
             return std::pair(p.triangle, p.feature) < std::pair(q.triangle, q.feature);
         };
@@ -593,10 +595,10 @@ TEST_CASE("a contact with more points than the capacity says so, and is refused 
         ContactTracker<double> few(mesh, {.max_contact_points = 3}), enough(mesh);
         const auto contact = few.update(tree, mesh.positions(), tool),
                    all = enough.update(tree, mesh.positions(), tool);
-        REQUIRE(all.points.size() > 3);
-        CHECK(all.has_all_points);
-        CHECK(contact.points.size() == 3);
-        CHECK_FALSE(contact.has_all_points);
+        REQUIRE(all.patch.points.size() > 3);
+        CHECK(all.patch.has_all_points);
+        CHECK(contact.patch.points.size() == 3);
+        CHECK_FALSE(contact.patch.has_all_points);
         membrane::QuasiStaticSolver solver(network);
         Points<double> x = mesh.positions();
         const auto report = solver.step(x, 1e-3, network, membrane::NoFoundation(), press(tool, contact));
@@ -643,7 +645,7 @@ TEST_CASE("on an open surface a tool that grazes a crest is on the side it came 
         tool.position = crest + random.number(0.01, 1.0) * radius * displacement;
         const auto contact = tracker.update(tree, x, tool);
         REQUIRE(contact.touching());
-        CHECK(contact.side == 1);
+        CHECK(contact.patch.side == 1);
     }
 }
 
@@ -726,8 +728,8 @@ TEST_CASE("a tool keeps its side of a sheet until it is clear of it, in closed f
                 at(pi, 0.018, middle);
                 REQUIRE(sheet.contact.touching());
                 const bool keeps = grasping || edges < 2;
-                CHECK(sheet.contact.side == (keeps ? 1 : -1));
-                CHECK(sheet.contact.tunnelled == keeps);
+                CHECK(sheet.contact.patch.side == (keeps ? 1 : -1));
+                CHECK(sheet.contact.patch.tunnelled == keeps);
                 CHECK((sheet.contact.normal.z() > 0) == keeps);
             }
         }
@@ -744,7 +746,7 @@ TEST_CASE("what touches a border is on the side within 60 degrees of its normal,
         REQUIRE(sheet.contact.touching());
         sheet.go_round(0.07, angle, pi);
         sheet.touch_from_below(0.07);
-        CHECK(sheet.contact.side == (degrees < 60 ? 1 : -1));
+        CHECK(sheet.contact.patch.side == (degrees < 60 ? 1 : -1));
     }
 }
 
@@ -782,7 +784,7 @@ TEST_CASE("a tool that has slid off a border that it displaced may touch the oth
             sheet.go_round(0.05, 1.2 * pi, 1.2 * pi);
             if (bend > 0) CHECK_FALSE(sheet.contact.touching());
             sheet.touch_from_below(0.25);
-            CHECK(sheet.contact.tunnelled == (bend == 0));
+            CHECK(sheet.contact.patch.tunnelled == (bend == 0));
             CHECK((sheet.contact.normal.z() < 0) == (bend > 0));
         }
     }
@@ -794,7 +796,7 @@ TEST_CASE("a shaft that has slid off a border is beneath it, and does not pull w
         SlidOff sheet(Vector(0, 0.2, 0), 1);
         sheet.go(Vector(0.4, 0.03, -0.1) - 0.019 * sheet.normal);
         REQUIRE(sheet.contact.touching());
-        CHECK_FALSE(sheet.contact.tunnelled);
+        CHECK_FALSE(sheet.contact.patch.tunnelled);
         CHECK(sheet.contact.normal.dot(sheet.normal) < 0);
         if (height != 0) sheet.lift(height);
         CHECK(sheet.contact.touching() == (height <= 0));  // farther out than the membrane without it: nothing to push
@@ -817,11 +819,11 @@ TEST_CASE("a shaft through a ridge, both ends outside, is as deep as its middle"
                 {.position = height * out - before * along, .axis = (before + behind) * along, .radius = 0.02});
         }
         REQUIRE(contact.touching());
-        CHECK(contact.tunnelled);
-        CHECK(contact.closed);
+        CHECK(contact.patch.tunnelled);
+        CHECK(contact.patch.closed);
         CHECK(contact.normal.dot(out) > 0.9);
-        const auto nearest = tree.closest_point(mesh.positions(), contact.axis_point);
-        CHECK(std::abs(contact.axis_point.dot(along)) < 0.05);
+        const auto nearest = tree.closest_point(mesh.positions(), contact.patch.axis_point);
+        CHECK(std::abs(contact.patch.axis_point.dot(along)) < 0.05);
         CHECK(contact.gap == Approx(-std::sqrt(nearest.squared_distance) - 0.02));
     }
 }
@@ -843,7 +845,7 @@ TEST_CASE("a sphere that is first seen behind a folded surface is inside where t
                                                                  Tool<double>{.position = place, .radius = 0.1});
         REQUIRE(contact.touching());
         const bool is_inside = std::abs(winding_number(x, mesh.triangles(), place)) > 0.5;
-        if (contact.tunnelled || !crumpled) CHECK(contact.tunnelled == is_inside);
+        if (contact.patch.tunnelled || !crumpled) CHECK(contact.patch.tunnelled == is_inside);
         ++(is_inside ? inside : outside);
     }
     CHECK((inside > 0 && outside > 0));
@@ -865,16 +867,16 @@ TEST_CASE("the candidates are all triangles within two rings, for some ticks aft
         const Tool<double> tool{.position = (1 + height) * Vector(0.1, 0.2 + 0.002 * tick, 1).normalized(),
                                 .radius = 0.1};
         const auto contact = tracker.update(tree, mesh.positions(), tool);
-        REQUIRE(contact.tunnelled == (tick == 10));
+        REQUIRE(contact.patch.tunnelled == (tick == 10));
         std::vector<Index> expected, found;
-        for (const auto& listed : contact.triangles) expected.push_back(listed.triangle);
+        for (const auto& listed : contact.patch.triangles) expected.push_back(listed.triangle);
         for (int ring = 0; ring < (tick >= 10 && tick < 26 ? 6 : 2); ++ring) {
             for (const Index f : std::vector(expected)) {
                 surface.around_corners(f, [&](Index g) { expected.push_back(g); });
             }
             expected = sorted(expected);
         }
-        for (const auto& listed : contact.candidates) found.push_back(listed.triangle);
+        for (const auto& listed : contact.patch.candidates) found.push_back(listed.triangle);
         CHECK(sorted(found).size() == found.size());
         CHECK(sorted(found) == expected);
     }
@@ -895,8 +897,8 @@ TEST_CASE("after a reset a tracker is as new") {
             const auto tool = any();
             const auto a = used.update(tree, mesh.positions(), tool), b = fresh.update(tree, mesh.positions(), tool);
             REQUIRE((a.phase == b.phase && a.triangle == b.triangle && a.normal == b.normal && a.gap == b.gap));
-            REQUIRE((a.depth == b.depth && a.tunnelled == b.tunnelled));
-            REQUIRE(a.candidates.size() == b.candidates.size());
+            REQUIRE((a.depth == b.depth && a.patch.tunnelled == b.patch.tunnelled));
+            REQUIRE(a.patch.candidates.size() == b.patch.candidates.size());
             REQUIRE(used.full_query_count() - before == fresh.full_query_count());
         }
     }
@@ -925,22 +927,22 @@ void check_same(const Contact<double>& found, const Contact<double>& expected) {
     REQUIRE(found.phase == expected.phase);
     REQUIRE(found.triangle == expected.triangle);
     REQUIRE(found.corners == expected.corners);
-    REQUIRE(found.side == expected.side);
-    REQUIRE(found.closed == expected.closed);
-    REQUIRE(found.tunnelled == expected.tunnelled);
+    REQUIRE(found.patch.side == expected.patch.side);
+    REQUIRE(found.patch.closed == expected.patch.closed);
+    REQUIRE(found.patch.tunnelled == expected.patch.tunnelled);
     REQUIRE(membrane::norm<double>(found.point - expected.point) < rounding);
     REQUIRE(membrane::norm<double>(found.normal - expected.normal) < rounding);
     REQUIRE(std::abs(found.gap - expected.gap) < rounding);
-    REQUIRE(found.triangles.size() == expected.triangles.size());
-    REQUIRE(found.candidates.size() == expected.candidates.size());
-    for (std::size_t i = 0; i < found.candidates.size(); ++i) {
-        REQUIRE(found.candidates[i].triangle == expected.candidates[i].triangle);
-        REQUIRE(found.candidates[i].corners == expected.candidates[i].corners);
+    REQUIRE(found.patch.triangles.size() == expected.patch.triangles.size());
+    REQUIRE(found.patch.candidates.size() == expected.patch.candidates.size());
+    for (std::size_t i = 0; i < found.patch.candidates.size(); ++i) {
+        REQUIRE(found.patch.candidates[i].triangle == expected.patch.candidates[i].triangle);
+        REQUIRE(found.patch.candidates[i].corners == expected.patch.candidates[i].corners);
     }
-    REQUIRE(found.points.size() == expected.points.size());
-    for (std::size_t i = 0; i < found.points.size(); ++i) {
-        REQUIRE(found.points[i].corners == expected.points[i].corners);
-        REQUIRE(std::abs(found.points[i].gap - expected.points[i].gap) < rounding);
+    REQUIRE(found.patch.points.size() == expected.patch.points.size());
+    for (std::size_t i = 0; i < found.patch.points.size(); ++i) {
+        REQUIRE(found.patch.points[i].corners == expected.patch.points[i].corners);
+        REQUIRE(std::abs(found.patch.points[i].gap - expected.patch.points[i].gap) < rounding);
     }
 }
 
@@ -1010,7 +1012,7 @@ TEST_CASE("a contact goes on while the surface tears under it", "[tear]") {
             REQUIRE(std::abs(contact.depth - expected.depth) < 1e-12);
             REQUIRE(membrane::norm<double>(contact.point - expected.point) < 1e-12);
             contacts += contact.touching() ? 1 : 0;
-            for (const auto& listed : contact.candidates) {
+            for (const auto& listed : contact.patch.candidates) {
                 const auto corners = surface.triangles().col(listed.triangle);
                 REQUIRE(listed.corners == std::array<Index, 3>{corners[0], corners[1], corners[2]});
             }
@@ -1044,7 +1046,7 @@ TEST_CASE("a tool that slides over tears touches both sides at once", "[tear]") 
                 const auto nearest = closest_point(membrane::triangle_at(x, mesh.triangles().col(f)), tool.position);
                 if (nearest.squared_distance > tool.radius * tool.radius) continue;
                 const auto is_f = [f](const auto& listed) { return listed.triangle == f; };
-                REQUIRE(std::any_of(contact.triangles.begin(), contact.triangles.end(), is_f));
+                REQUIRE(std::any_of(contact.patch.triangles.begin(), contact.patch.triangles.end(), is_f));
             }
             towards += 0.1 * Vector(random.number(-1.0, 1.0), random.number(-1.0, 1.0), 0);
             towards /= membrane::norm(towards);
@@ -1129,7 +1131,7 @@ TEST_CASE("a shaft first seen across a closed surface is inside where the surfac
         const auto contact = tracker.update(tree, x, shaft);
         if (deepest > 0.02) CHECK(contact.touching());
         if (!contact.touching() || !(contact.gap < -shaft.radius * 1.001)) continue;
-        CHECK(winding_by_angles(x, triangles, contact.axis_point) > 0.5);
+        CHECK(winding_by_angles(x, triangles, contact.patch.axis_point) > 0.5);
         CHECK(-contact.gap - shaft.radius < deepest + 0.05);
         ++across;
     }

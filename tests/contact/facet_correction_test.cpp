@@ -12,9 +12,9 @@
 #include <membrane/accuracy/equilibrium.hpp>
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/meshing/distmesh.hpp>
-#include <membrane/model/foundation_layer.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
 
@@ -218,8 +218,8 @@ TEST_CASE("no offset without a ball's force, and what is refused") {
     contact.corners = {mesh.triangles()(0, 0), mesh.triangles()(1, 0), mesh.triangles()(2, 0)};
     contact.barycentric = {1, 0, 0};
     contact.normal = {0, 0, 1};
-    contact.axis_point = {0, 0, 1e-3};
-    contact.radius = 1e-3;
+    contact.patch.axis_point = {0, 0, 1e-3};
+    contact.patch.radius = 1e-3;
     CHECK(correction(x, contact, {0, 0, 0}).isZero(0));
     CHECK(correction(x, contact, {0, 0, std::numeric_limits<double>::quiet_NaN()}).isZero(0));
     const Point offset = correction(x, contact, {0, 0, 1e-4});
@@ -229,7 +229,7 @@ TEST_CASE("no offset without a ball's force, and what is refused") {
     Points<double> wild = x;
     for (const Index v : contact.corners) wild.col(v).setConstant(std::numeric_limits<double>::quiet_NaN());
     const membrane::ContactTriangle listed{0, contact.corners};
-    contact.triangles = {&listed, 1};
+    contact.patch.triangles = {&listed, 1};
     CHECK(correction(x, contact, {0, 0, 1e-4}).z() > 0);
     CHECK(membrane::is_finite(correction(wild, contact, {0, 0, 1e-4})));
 
@@ -237,9 +237,9 @@ TEST_CASE("no offset without a ball's force, and what is refused") {
     CHECK(correction(rows, contact, {0, 0, 1e-4}).isZero(0));
     CHECK(correction(x.leftCols(3), contact, {0, 0, 1e-4}).isZero(0));
     const membrane::ContactTriangle elsewhere{0, {0, 1, mesh.vertex_count()}};
-    contact.triangles = {&elsewhere, 1};
+    contact.patch.triangles = {&elsewhere, 1};
     CHECK(correction(x, contact, {0, 0, 1e-4}).isZero(0));
-    contact.triangles = {&listed, 1};
+    contact.patch.triangles = {&listed, 1};
 
     Points<double> flat = x;
     for (const Index v : contact.corners) flat.col(v) = x.col(contact.corners[0]);

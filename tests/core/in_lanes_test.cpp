@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/core/in_lanes.hpp>
+#include <membrane/core/lanes.hpp>
 
 #include <cstddef>
 #include <string>

@@ -23,8 +23,8 @@
 // [/threads]
 
 // [hand]
+#include <membrane/certify/passivity.hpp>
 #include <membrane/haptics/force_limits.hpp>
-#include <membrane/haptics/passivity.hpp>
 // [/hand]
 
 // [smooth]
@@ -53,15 +53,15 @@
 // [/handover]
 
 // [recording]
-#include <membrane/haptics/recording_file.hpp>
+#include <membrane/replay/recording_file.hpp>
 // [/recording]
 
 // [tear_reset]
-#include <membrane/core/initial_state.hpp>
+#include <membrane/replay/initial_state.hpp>
 // [/tear_reset]
 
 // [snapshot]
-#include <membrane/core/snapshot.hpp>
+#include <membrane/replay/snapshot.hpp>
 // [/snapshot]
 
 // [facets]
@@ -82,13 +82,13 @@
 // [/validate]
 
 // [constants]
-#include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/recommended_layers.hpp>
-#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
+#include <membrane/tissue/recommended_layers.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 // [/constants]
 
 // [adhesion]
-#include <membrane/model/cohesive_springs.hpp>
+#include <membrane/tear/cohesive_springs.hpp>
 // [/adhesion]
 
 // [friction]

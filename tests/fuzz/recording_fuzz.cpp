@@ -5,7 +5,7 @@
 #include <sstream>
 #include <string>
 
-#include <membrane/haptics/recording_file.hpp>
+#include <membrane/replay/recording_file.hpp>
 
 #include "bytes.hpp"
 

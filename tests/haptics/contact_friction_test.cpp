@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include <membrane/haptics/passivity.hpp>
+#include <membrane/certify/passivity.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

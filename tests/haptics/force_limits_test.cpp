@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/core/snapshot.hpp>
+#include <membrane/replay/snapshot.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

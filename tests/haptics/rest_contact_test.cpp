@@ -7,8 +7,8 @@
 #include <limits>
 #include <numbers>
 
+#include <membrane/certify/passivity.hpp>
 #include <membrane/haptics/force_policy.hpp>
-#include <membrane/haptics/passivity.hpp>
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/membrane.hpp>
 
@@ -112,7 +112,7 @@ TEMPLATE_TEST_CASE("depth and normal are distance to the surface at rest and its
             other.phase = ContactPhase::ongoing;
             other.normal = random.unit_vector<S>();
             other.depth = S(1);
-            other.side = S(-1);
+            other.patch.side = S(-1);
             REQUIRE(rest(other, ball_at(p)).normal == contact.normal);
             REQUIRE(rest(other, ball_at(p)).depth == contact.depth);
         }
@@ -156,14 +156,14 @@ TEST_CASE("a shaft is felt where it is deepest, an open surface from its side an
         const auto contact = rest({}, shaft);
         CHECK(contact.depth == Approx(0.011 - height).margin(1.5e-4));  // flat triangles
         CHECK(dot(contact.normal, up) > 0.98);
-        CHECK(norm<double>(contact.axis_point - height * up) < 3e-3);
+        CHECK(norm<double>(contact.patch.axis_point - height * up) < 3e-3);
     }
 
     const auto flat = RestContact(sheet<double>({.width = 0.02, .height = 0.02, .columns = 10, .rows = 10}));
     const auto at = [](double x, double z) { return ball_at<double>({x, 1e-4, z}); };
     Contact<double> above, below;
     above.phase = below.phase = ContactPhase::ongoing;
-    below.side = -1;
+    below.patch.side = -1;
     CHECK_FALSE(flat({}, at(0, 5e-4)).touching());  // not touched
     CHECK(flat(above, at(0, 5e-4)).depth == Approx(5e-4));
     CHECK(flat(above, at(0, 5e-4)).normal.z() == Approx(1));

@@ -25,9 +25,9 @@ Contact<S> touching(Index triangle, const Vector3<S>& tool) {
     Contact<S> contact;
     contact.phase = ContactPhase::ongoing;
     contact.triangle = triangle;
-    contact.axis_point = tool;
+    contact.patch.axis_point = tool;
     contact.normal = Vector3<S>(1, 0, 0);
-    contact.radius = S(1e-3);
+    contact.patch.radius = S(1e-3);
     return contact;
 }
 
@@ -60,9 +60,9 @@ TEMPLATE_TEST_CASE("the proxy has the tool along its normal, above and below the
             const Vector3<S> foot = point_at(triangle_at(mesh.positions(), corners), weights);
             const Vector3<S> tool = foot + height * normal;
             auto contact = touching<S>(tree.closest_point(mesh.positions(), tool).triangle, tool);
-            contact.side = random.chance(0.5) ? S(1) : S(-1);
+            contact.patch.side = random.chance(0.5) ? S(1) : S(-1);
             const auto found = smooth(contact);
-            CHECK(norm<S>(found.normal - contact.side * normal) < 2e3 * std::numeric_limits<S>::epsilon());
+            CHECK(norm<S>(found.normal - contact.patch.side * normal) < 2e3 * std::numeric_limits<S>::epsilon());
             CHECK(found.depth == contact.depth);
             CHECK(found.triangle == contact.triangle);
         }
@@ -171,13 +171,13 @@ TEST_CASE("what is no contact, or not finite, or has no normal, stays as it is",
     const auto collapsed = smooth(contact, body).normal;
     CHECK((collapsed == contact.normal || std::abs(norm(collapsed) - 1) < 1e-12));
     for (const double far : {0.0, 1e300, -1e300}) {
-        contact.axis_point = {0, far, 0};
+        contact.patch.axis_point = {0, far, 0};
         const auto found = smooth(contact).normal;
         CHECK((found == contact.normal || std::abs(norm(found) - 1) < 1e-12));
     }
-    contact.axis_point.x() = std::numeric_limits<double>::infinity();
+    contact.patch.axis_point.x() = std::numeric_limits<double>::infinity();
     CHECK(smooth(contact).normal == contact.normal);
-    contact.axis_point = {0, 0, 0.0105};  // and it goes on
+    contact.patch.axis_point = {0, 0, 0.0105};  // and it goes on
     CHECK(norm<double>(smooth(contact).normal - Vector3<double>(0, 0, 1)) < 1e-12);
     auto elsewhere = contact;
     elsewhere.triangle = mesh.triangle_count();
@@ -201,7 +201,7 @@ TEST_CASE("a body that moves takes its normals along", "[smooth]") {
         const Vector3<double> tool = 0.0105 * random.unit_vector();
         const auto contact = touching(AabbTree(mesh).closest_point(mesh.positions(), tool).triangle, tool);
         auto seen = contact;
-        seen.axis_point = turn * contact.axis_point + displacement;
+        seen.patch.axis_point = turn * contact.patch.axis_point + displacement;
         CHECK(norm<double>(smooth(seen, body).normal - turn * smooth(contact).normal) < 1e-9);
     }
 }

@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include <membrane/haptics/passivity.hpp>
+#include <membrane/certify/passivity.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

@@ -3,8 +3,8 @@
 
 #include <limits>
 
-#include <membrane/model/foundation_layer.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

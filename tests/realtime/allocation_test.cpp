@@ -13,9 +13,9 @@
 #include <membrane/accuracy/tangent_stiffness.hpp>
 #include <membrane/certify/error_bound.hpp>
 #include <membrane/certify/factored_convexity.hpp>
-#include <membrane/core/snapshot.hpp>
 #include <membrane/core/thread_pool.hpp>
-#include <membrane/haptics/recording.hpp>
+#include <membrane/replay/recording.hpp>
+#include <membrane/replay/snapshot.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

@@ -8,7 +8,7 @@
 #include <membrane/contact/tool.hpp>
 #include <membrane/haptics/device.hpp>
 #include <membrane/haptics/handover.hpp>
-#include <membrane/haptics/simulated_hand.hpp>
+#include <membrane/replay/simulated_hand.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

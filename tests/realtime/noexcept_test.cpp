@@ -2,21 +2,21 @@
 #include <array>
 #include <span>
 
+#include <membrane/certify/passivity.hpp>
 #include <membrane/haptics/contact_friction.hpp>
 #include <membrane/haptics/extrapolated_reaction.hpp>
 #include <membrane/haptics/force_limits.hpp>
 #include <membrane/haptics/grasp_transition.hpp>
 #include <membrane/haptics/handover.hpp>
-#include <membrane/haptics/passivity.hpp>
-#include <membrane/haptics/recording.hpp>
-#include <membrane/haptics/simulated_hand.hpp>
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/haptics/virtual_coupling.hpp>
 #include <membrane/membrane.hpp>
-#include <membrane/model/cohesive_springs.hpp>
 #include <membrane/model/moving_foundation.hpp>
+#include <membrane/replay/recording.hpp>
+#include <membrane/replay/simulated_hand.hpp>
 #include <membrane/solve/explicit_euler.hpp>
 #include <membrane/solve/tool_friction.hpp>
+#include <membrane/tear/cohesive_springs.hpp>
 #include <membrane/tear/tearing.hpp>
 
 #include "support/catch.hpp"

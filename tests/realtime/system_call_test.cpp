@@ -6,7 +6,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include <membrane/haptics/recording.hpp>
+#include <membrane/replay/recording.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

@@ -7,7 +7,7 @@
 #include <sstream>
 #include <tuple>
 
-#include <membrane/haptics/recording_file.hpp>
+#include <membrane/replay/recording_file.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"

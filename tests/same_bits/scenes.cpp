@@ -25,19 +25,19 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/core/initial_state.hpp>
 #include <membrane/core/thread_pool.hpp>
 #include <membrane/haptics/contact_friction.hpp>
 #include <membrane/haptics/force_limits.hpp>
-#include <membrane/haptics/recording_file.hpp>
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/haptics/virtual_coupling.hpp>
 #include <membrane/membrane.hpp>
-#include <membrane/model/cohesive_springs.hpp>
 #include <membrane/model/moving_foundation.hpp>
-#include <membrane/model/tearable_springs.hpp>
+#include <membrane/replay/initial_state.hpp>
+#include <membrane/replay/recording_file.hpp>
 #include <membrane/solve/tool_friction.hpp>
 #include <membrane/surface/moving_body.hpp>
+#include <membrane/tear/cohesive_springs.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 #include <membrane/tear/tearing.hpp>
 #include <membrane/tissue/bending.hpp>
 #include <membrane/tissue/pressure.hpp>

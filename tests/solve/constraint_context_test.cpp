@@ -21,8 +21,11 @@ struct SixPoints {
     ConstPointsRef<double> x{points};
     VertexRows<double> work{6};
     ContactState<double> contacts{6, 3};
+    ConstrainedStep<double> step{x, work, contacts, *this};
 
     SixPoints() { begin_step(); }
+    SixPoints(const SixPoints&) = delete;
+    SixPoints& operator=(const SixPoints&) = delete;
     void begin_step() {
         work.begin_step();
         contacts.begin_step();
@@ -39,30 +42,28 @@ std::vector<Index> as_vector(std::span<const Index> items) { return {items.begin
 
 TEST_CASE("a context knows its vertices", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
+    ConstraintContext<double> context(scene.step);
     for (Index v = 0; v < 6; ++v) {
         CHECK(context.validate(v));
         CHECK(context.position(v) == point(scene.points, v));
     }
-    CHECK(context.refusal() == StepStatus::advanced);
+    CHECK(scene.step.refusal() == StepStatus::advanced);
     for (const Index wrong : {-1, 6, 1000, unlimited}) {
-        ConstraintContext<double> other(scene.x, scene.work, scene.contacts, scene);
-        other.select_constraint(3);
-        CHECK_FALSE(other.validate(wrong));
-        other.select_constraint(4);
-        CHECK_FALSE(other.validate(wrong));
-        CHECK(other.refusal() == StepStatus::invalid_input);
-        CHECK(other.invalid_constraint() == 3);
-        other.refuse_points();
-        CHECK(other.refusal() == StepStatus::invalid_input);
-        other.compare_splits(-1, StepStatus::network_missed_split);
-        CHECK(other.refusal() == StepStatus::network_missed_split);
+        ConstrainedStep<double> step(scene.x, scene.work, scene.contacts, scene);
+        CHECK_FALSE(ConstraintContext<double>(step, 3).validate(wrong));
+        CHECK_FALSE(ConstraintContext<double>(step, 4).validate(wrong));
+        CHECK(step.refusal() == StepStatus::invalid_input);
+        CHECK(step.invalid_constraint() == 3);
+        step.refuse_points();
+        CHECK(step.refusal() == StepStatus::invalid_input);
+        step.compare_splits(-1, StepStatus::network_missed_split);
+        CHECK(step.refusal() == StepStatus::network_missed_split);
     }
 }
 
 TEST_CASE("what is moved is moved in the step, and the positions of the user stay", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
+    ConstraintContext<double> context(scene.step);
     const Points<double> before = scene.points;
     context.move(2, {1, 0, 0});
     context.move(2, {0, 1, 0});
@@ -80,7 +81,7 @@ TEST_CASE("what is moved is moved in the step, and the positions of the user sta
 
 TEST_CASE("prescribed and pinned vertices are fixed until the step ends, and a pinned one stays", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
+    ConstraintContext<double> context(scene.step);
     const Points<double> before = scene.points;
     for (const Index v : {0, 1, 5}) scene.work.set_response(v, {diagonal3(0.5)}, 0.5);
     CHECK(context.fixed(5));
@@ -111,7 +112,7 @@ TEST_CASE("prescribed and pinned vertices are fixed until the step ends, and a p
 
 TEST_CASE("forces add up, and are taken back with the step", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
+    ConstraintContext<double> context(scene.step);
     context.add_force(3, {1, 2, 3});
     context.add_force(3, {1, 0, 0});
     context.add_force(0, {0, 0, 5});
@@ -129,7 +130,7 @@ TEST_CASE("forces add up, and are taken back with the step", "[context]") {
 
 TEST_CASE("forces and stiffnesses that are added, either alone too, last until the step ends", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
+    ConstraintContext<double> context(scene.step);
     context.add_force(1, {1, 2, 3});
     for (const Index v : {2, 2, 4}) context.add_stiffness(v, 0.5);
     CHECK(as_vector(scene.work.forced.items()) == std::vector<Index>{1, 2, 4});
@@ -142,35 +143,30 @@ TEST_CASE("forces and stiffnesses that are added, either alone too, last until t
 
 TEST_CASE("seeds keep their order, and each comes once", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
+    ConstraintContext<double> context(scene.step);
     for (const Index v : {4, 0, 4, 2, 0}) context.seed(v);
     CHECK(as_vector(scene.work.seeds.items()) == std::vector<Index>{4, 0, 2});
 }
 
 TEST_CASE("each constraint finds the points it had in the step before, and no others", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
-    const auto begin = [&](std::size_t constraint) {
-        context.select_constraint(constraint);
-        context.begin_points();
-    };
-    begin(0);
+    ConstraintContext<double> context(scene.step, 0), second(scene.step, 1), third(scene.step, 2);
+    scene.contacts.begin_points(0);
     CHECK(context.cached_point(7, 0, 0) == nullptr);
     context.add_point(point_of(7, 0, 1));
     context.add_point(point_of(8, 2, 2));
-    begin(1);
-    context.add_point(point_of(7, 0, 3));
-    CHECK(context.points().size() == 1);
-    CHECK(context.points()[0].force.z() == -3);
-    context.select_constraint(0);
+    scene.contacts.begin_points(1);
+    second.add_point(point_of(7, 0, 3));
+    CHECK(second.points().size() == 1);
+    CHECK(second.points()[0].force.z() == -3);
     CHECK(context.points().size() == 2);
     CHECK(context.points()[1].triangle == 8);
     CHECK(context.cached_point(7, 0, 0) == nullptr);  // they are of this step
-    CHECK(context.refusal() == StepStatus::advanced);
+    CHECK(scene.step.refusal() == StepStatus::advanced);
 
     scene.contacts.end_step();
     scene.begin_step();
-    begin(0);
+    scene.contacts.begin_points(0);
     CHECK(context.points().empty());
     for (const int round : {1, 2}) {  // in any order, and again
         CAPTURE(round);
@@ -181,32 +177,29 @@ TEST_CASE("each constraint finds the points it had in the step before, and no ot
         CHECK(context.cached_point(8, 0, 0) == nullptr);
         CHECK(context.cached_point(9, 2, 0) == nullptr);
     }
-    begin(1);
-    REQUIRE(context.cached_point(7, 0, 0) != nullptr);
-    CHECK(context.cached_point(7, 0, 0)->force.z() == -3);
-    CHECK(context.cached_point(8, 2, 0) == nullptr);
-    begin(2);
-    CHECK(context.cached_point(7, 0, 0) == nullptr);
+    REQUIRE(second.cached_point(7, 0, 0) != nullptr);
+    CHECK(second.cached_point(7, 0, 0)->force.z() == -3);
+    CHECK(second.cached_point(8, 2, 0) == nullptr);
+    CHECK(third.cached_point(7, 0, 0) == nullptr);
 
     scene.contacts.end_step();  // a step without points
     scene.begin_step();
-    begin(0);
+    scene.contacts.begin_points(0);
     CHECK(context.cached_point(7, 0, 0) == nullptr);
 }
 
 TEST_CASE("points can be forgotten, and are refused beyond the capacity", "[context]") {
     SixPoints scene;
-    ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
-    context.select_constraint(0);
-    context.begin_points();
+    ConstraintContext<double> context(scene.step);
+    scene.contacts.begin_points(0);
     for (Index f = 0; f < 3; ++f) context.add_point(point_of(f, 0));
-    CHECK(context.refusal() == StepStatus::advanced);
+    CHECK(scene.step.refusal() == StepStatus::advanced);
     context.add_point(point_of(3, 0));
-    CHECK(context.refusal() == StepStatus::too_many_contact_points);
+    CHECK(scene.step.refusal() == StepStatus::too_many_contact_points);
     CHECK(context.points().size() == 3);
     scene.contacts.end_step();
     scene.begin_step();
-    context.begin_points();
+    scene.contacts.begin_points(0);
     CHECK(context.cached_point(1, 0, 0) != nullptr);
     scene.contacts.reset_points();
     CHECK(context.cached_point(1, 0, 0) == nullptr);
@@ -215,7 +208,7 @@ TEST_CASE("points can be forgotten, and are refused beyond the capacity", "[cont
 TEST_CASE("whether a vertex that is not loaded is pinned is the network's word", "[context]") {
     SixPoints scene;
     scene.pinned_vertex = 2;
-    const ConstraintContext<double> context(scene.x, scene.work, scene.contacts, scene);
+    const ConstraintContext<double> context(scene.step);
     CHECK(context.fixed(2));
     scene.pinned_vertex = 3;
     CHECK_FALSE(context.fixed(2));
@@ -225,10 +218,8 @@ TEST_CASE("whether a vertex that is not loaded is pinned is the network's word",
 TEST_CASE("a state is copied with all it holds", "[context]") {
     auto scene = std::make_unique<SixPoints>();
     {
-        ConstraintContext<double> context(scene->x, scene->work, scene->contacts, *scene);
-        context.select_constraint(0);
-        context.begin_points();
-        context.add_point(point_of(7, 0, 4));
+        scene->contacts.begin_points(0);
+        ConstraintContext<double>(scene->step).add_point(point_of(7, 0, 4));
         scene->contacts.end_step();
     }
     VertexRows<double> copy = scene->work;
@@ -237,14 +228,14 @@ TEST_CASE("a state is copied with all it holds", "[context]") {
     scene.reset();
     const ConstPointsRef<double> x(points);
     const SixPoints pins;
-    ConstraintContext<double> context(x, copy, contacts, pins);
+    ConstrainedStep<double> step(x, copy, contacts, pins);
+    ConstraintContext<double> context(step);
     copy.begin_step();
     contacts.begin_step();
-    context.select_constraint(0);
-    context.begin_points();
+    contacts.begin_points(0);
     REQUIRE(context.cached_point(7, 0, 0) != nullptr);
     CHECK(context.cached_point(7, 0, 0)->force.z() == -4);
     for (Index f = 0; f < 3; ++f) context.add_point(point_of(f, 0));
-    CHECK(context.refusal() == StepStatus::advanced);  // the capacity is copied too
+    CHECK(step.refusal() == StepStatus::advanced);  // the capacity is copied too
     CHECK(copy.vertex_count() == 6);
 }

@@ -35,7 +35,7 @@ TEST_CASE("a set of constraints is valid if all are, violated if any is, finite 
     const struct {
         bool pinned(Index) const { return false; }
     } none_pinned;
-    ConstraintContext<double> context(x, work, contacts, none_pinned);
+    ConstrainedStep<double> step(x, work, contacts, none_pinned);
     Index begun = 0;
     std::array<Vector3<double>, 2> reactions{};
     const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -43,7 +43,7 @@ TEST_CASE("a set of constraints is valid if all are, violated if any is, finite 
         for (const bool second : {false, true}) {
             const Told a{first, first, first ? 1 : nan, &begun}, b{second, second, second ? 2 : nan, &begun};
             const std::array refs{ConstraintRef<double>(a), ConstraintRef<double>(b)};
-            const ConstraintList<double> both(context, refs);
+            const ConstraintList<double> both(step, refs);
             CHECK(both.first_invalid() == (!first ? 0 : !second ? 1 : no_index));
             CHECK(both.enforce() == (first || second));
             CHECK(both.react(reactions) == (first && second));
@@ -54,7 +54,7 @@ TEST_CASE("a set of constraints is valid if all are, violated if any is, finite 
     CHECK(reactions[0].x() == 1);
     CHECK(reactions[1].x() == 2);
 
-    const ConstraintList<double> none(context, {});
+    const ConstraintList<double> none(step, {});
     CHECK(none.first_invalid() == no_index);
     CHECK_FALSE(none.enforce());
     CHECK(none.react({}));

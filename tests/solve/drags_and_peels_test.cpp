@@ -7,12 +7,12 @@
 #include <type_traits>
 #include <vector>
 
-#include <membrane/core/snapshot.hpp>
 #include <membrane/membrane.hpp>
-#include <membrane/model/cohesive_springs.hpp>
 #include <membrane/model/moving_foundation.hpp>
-#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/replay/snapshot.hpp>
 #include <membrane/solve/tool_friction.hpp>
+#include <membrane/tear/cohesive_springs.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"

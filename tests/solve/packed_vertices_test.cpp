@@ -12,13 +12,13 @@
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/core/thread_pool.hpp>
-#include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/moving_foundation.hpp>
 #include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
 #include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
 #include <membrane/tissue/pressure.hpp>
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>

@@ -9,10 +9,10 @@
 
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/contact/contact_tracker.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"

@@ -634,13 +634,13 @@ TEMPLATE_TEST_CASE("constraints that make no sense are refused, and nothing has 
     CHECK(refused_with([](auto& c) { c.corners[1] = no_index; }));
     CHECK(refused_with([](auto& c) { c.corners[2] = 162; }));
     CHECK(refused_with([](auto& c) { c.gap = Limits::quiet_NaN(); }));
-    CHECK(refused_with([](auto& c) { c.axis_point.x() = Limits::infinity(); }));
-    CHECK(refused_with([](auto& c) { c.radius = 0; }));
+    CHECK(refused_with([](auto& c) { c.patch.axis_point.x() = Limits::infinity(); }));
+    CHECK(refused_with([](auto& c) { c.patch.radius = 0; }));
     const std::vector<ContactTriangle> elsewhere{{0, {0, 1, 162}}};
-    CHECK(refused_with([&](auto& c) { c.triangles = elsewhere; }));
-    CHECK(refused_with([&](auto& c) { c.candidates = elsewhere; }));
+    CHECK(refused_with([&](auto& c) { c.patch.triangles = elsewhere; }));
+    CHECK(refused_with([&](auto& c) { c.patch.candidates = elsewhere; }));
     const std::vector<ContactPoint<S>> points_elsewhere{{0, 0, {0, 1, 162}}};
-    CHECK(refused_with([&](auto& c) { c.points = points_elsewhere; }));
+    CHECK(refused_with([&](auto& c) { c.patch.points = points_elsewhere; }));
     Contact<S> made_up;
     made_up.phase = ContactPhase::ongoing;
     CHECK(refused(press(tool, made_up)));

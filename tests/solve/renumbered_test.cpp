@@ -9,8 +9,8 @@
 #include <Eigen/LU>
 
 #include <membrane/membrane.hpp>
-#include <membrane/model/foundation_layer.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
 
@@ -228,14 +228,15 @@ void compare(bool shafts, int first_seed, int seeds) {
             CAPTURE(expected[i].depth, found[i].depth);
             if (i == scene.jump) {
                 const auto &a = expected[i].found, &b = found[i].found;
-                CAPTURE(a.point, b.point, a.normal, b.normal, a.gap, b.gap, a.depth, b.depth, a.tunnelled, b.tunnelled);
+                CAPTURE(a.point, b.point, a.normal, b.normal, a.gap, b.gap, a.depth, b.depth, a.patch.tunnelled,
+                        b.patch.tunnelled);
                 REQUIRE(a.touching() == b.touching());
-                REQUIRE(a.tunnelled == b.tunnelled);
+                REQUIRE(a.patch.tunnelled == b.patch.tunnelled);
                 REQUIRE(norm<double>(a.point - b.point) < 1e-4 * R);
                 REQUIRE(norm<double>(a.normal - b.normal) < 1e-3);
                 REQUIRE(std::abs(a.gap - b.gap) < 1e-4 * R);
-                if (a.closed) REQUIRE(std::abs(a.depth - b.depth) < 1e-4 * R);
-                jumps += a.tunnelled;
+                if (a.patch.closed) REQUIRE(std::abs(a.depth - b.depth) < 1e-4 * R);
+                jumps += a.patch.tunnelled;
                 continue;
             }
             if (!expected[i].converged || !found[i].converged || !same(expected[i], control[i])) break;

@@ -121,10 +121,13 @@ bool same(const Contact<S>& a, const Contact<S>& b) {
         return p.triangle == q.triangle && p.feature == q.feature && p.gap == q.gap && same_bits(p.normal, q.normal);
     };
     return a.phase == b.phase && a.triangle == b.triangle && a.gap == b.gap && a.depth == b.depth &&
-           a.tunnelled == b.tunnelled && same_bits(a.point, b.point) && same_bits(a.normal, b.normal) &&
-           std::equal(a.triangles.begin(), a.triangles.end(), b.triangles.begin(), b.triangles.end(), listed) &&
-           std::equal(a.candidates.begin(), a.candidates.end(), b.candidates.begin(), b.candidates.end(), listed) &&
-           std::equal(a.points.begin(), a.points.end(), b.points.begin(), b.points.end(), same_point);
+           a.patch.tunnelled == b.patch.tunnelled && same_bits(a.point, b.point) && same_bits(a.normal, b.normal) &&
+           std::equal(a.patch.triangles.begin(), a.patch.triangles.end(), b.patch.triangles.begin(),
+                      b.patch.triangles.end(), listed) &&
+           std::equal(a.patch.candidates.begin(), a.patch.candidates.end(), b.patch.candidates.begin(),
+                      b.patch.candidates.end(), listed) &&
+           std::equal(a.patch.points.begin(), a.patch.points.end(), b.patch.points.begin(), b.patch.points.end(),
+                      same_point);
 }
 
 template <Real S>

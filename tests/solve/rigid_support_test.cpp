@@ -205,7 +205,7 @@ TEST_CASE("a point tool is held by what is fixed, however small the sphere that 
         const Tool<double> tool{.position = foot - down * Vector3<double>::UnitZ()};
         const double force = scene.tick(tool).z();
         if (i == 0 || i == 400) continue;
-        const double expected = 1000 * (down + scene.contact().radius) / weights.squaredNorm();
+        const double expected = 1000 * (down + scene.contact().patch.radius) / weights.squaredNorm();
         REQUIRE(std::abs(force - expected) < 1e-6 * expected);
     }
 }

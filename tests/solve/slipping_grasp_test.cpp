@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include <membrane/core/snapshot.hpp>
 #include <membrane/membrane.hpp>
 #include <membrane/model/moving_foundation.hpp>
+#include <membrane/replay/snapshot.hpp>
 
 #include "support/catch.hpp"
 #include "support/random.hpp"

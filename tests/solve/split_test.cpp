@@ -12,11 +12,11 @@
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/contact/grasper.hpp>
-#include <membrane/core/snapshot.hpp>
-#include <membrane/model/tearable_springs.hpp>
 #include <membrane/model/volume_springs.hpp>
+#include <membrane/replay/snapshot.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 #include <membrane/tear/tearing.hpp>
 #include <membrane/tissue/bending.hpp>
 #include <membrane/tissue/neo_hookean.hpp>

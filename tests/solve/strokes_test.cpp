@@ -6,10 +6,10 @@
 
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/contact/contact_tracker.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -85,11 +85,11 @@ Outcome play(const Membrane<S>& membrane, const Stroke& stroke, const SolverOpti
         tree.refit(x, report.moved);
         outcome.advanced = outcome.advanced && report.status == StepStatus::advanced;
         outcome.force = std::max(outcome.force, double(norm(report.reactions[0])));
-        for (const auto& touched : contact.triangles) {
+        for (const auto& touched : contact.patch.triangles) {
             const Vector3<S> other_end = tool.position + tool.axis;
             const auto nearest = closest_to_segment(triangle_at(x, touched.corners), tool.position, other_end);
             const double distance = std::sqrt(double(nearest.on_triangle.squared_distance));
-            outcome.overlap = std::max(outcome.overlap, (double(contact.radius) - distance) / membrane.edge);
+            outcome.overlap = std::max(outcome.overlap, (double(contact.patch.radius) - distance) / membrane.edge);
         }
         outcome.at_rest = t >= stroke.ticks() && report.converged && !contact.touching();
     }

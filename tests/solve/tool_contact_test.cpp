@@ -317,7 +317,7 @@ void check_tiny_contact(const Loop& loop, const test::PressedMembrane& pressed) 
         const Point normal = (corners.col(1) - corners.col(0)).cross(corners.col(2) - corners.col(0)).normalized();
         const double height = normal.dot(to_tool);
         nearest = std::min(nearest, to_tool.norm());
-        if (to_tool.norm() > loop.contact().detection_distance || std::abs(height - tool.radius) > 1e-8) continue;
+        if (to_tool.norm() > loop.contact().patch.detection_distance || std::abs(height - tool.radius) > 1e-8) continue;
         touching.push_back(
             {0, 0, {triangle.begin(), triangle.end()}, {weights.begin(), weights.end()}, height * normal, tool.radius});
     }
@@ -507,7 +507,7 @@ TEST_CASE("a sheet keeps the side from which it was touched first", "[press]") {
         Loop loop(mesh, material, options);
         REQUIRE(press_to_rest(loop, {stroke}));
 
-        CHECK(loop.contact().side == side);
+        CHECK(loop.contact().patch.side == side);
         CHECK(side * loop.contact().normal.z() > 0.5);
         CHECK(side * loop.reaction().z() > 1e-3);
         CHECK((side * loop.x().row(2)).minCoeff() < -0.01);
@@ -655,7 +655,7 @@ TEST_CASE("a contact that lacks points is refused, and nothing has moved", "[pre
     auto contact = tracker.update(AabbTree<double>(mesh), mesh.positions(), tool);
     REQUIRE(contact.touching());
     for (const bool has_all_points : {false, true}) {
-        contact.has_all_points = has_all_points;
+        contact.patch.has_all_points = has_all_points;
         QuasiStaticSolver<double> solver(network);
         Points<double> x = mesh.positions();
         const auto report = solver.step(x, 1e-3, network, foundation, press(tool, contact));
@@ -675,14 +675,14 @@ struct TwoTriangles {
         contact.corners = triangles[1].corners;
         contact.barycentric = {0.25, 0.25, 0.5};
         contact.normal = {0, 0, 1};
-        contact.axis_point = contact.previous_axis_point = tool.position;
+        contact.patch.axis_point = contact.patch.previous_axis_point = tool.position;
         contact.gap = tool.position.z() - 1;
-        contact.detection_distance = 1.2;
-        contact.radius = 1;
-        contact.triangles = contact.candidates = triangles;
+        contact.patch.detection_distance = 1.2;
+        contact.patch.radius = 1;
+        contact.patch.triangles = contact.patch.candidates = triangles;
         rows.begin_step();
         contacts.begin_step();
-        context.begin_points();
+        contacts.begin_points(0);
     }
 
     bool pinned(Index) const { return false; }
@@ -695,7 +695,8 @@ struct TwoTriangles {
     std::array<ContactTriangle, 2> triangles{{{0, {0, 1, 2}}, {1, {3, 4, 5}}}};
     VertexRows<double> rows{6};
     ContactState<double> contacts{6, 20};
-    ConstraintContext<double> context{start, rows, contacts, *this};
+    ConstrainedStep<double> step{start, rows, contacts, *this};
+    ConstraintContext<double> context{step};
     ToolContact<double> pressing;
 };
 
@@ -709,7 +710,7 @@ TEST_CASE("a triangle that comes into the tool during a step is a violation, wit
         const auto& corners = scene.triangles[0].corners;
         const auto near = contact_point(0, corners, triangle_at(scene.x, corners), tool, 0, 1.0);
         REQUIRE(near);
-        scene.pressing.contact.points = {&*near, 1};
+        scene.pressing.contact.patch.points = {&*near, 1};
         scene.pressing.begin(scene.context);
         REQUIRE(scene.context.points().size() == 1);
         CHECK_FALSE(scene.pressing.enforce(scene.context));
@@ -743,10 +744,10 @@ TEST_CASE("a surface on the tool's axis is pushed away from where the tool comes
         scene.x.colwise() += shift.eigen();
         const bool moves = random.chance(0.8);
         const Point from = moves ? random.unit_vector() : Point(0, 0, 1);
-        if (moves) scene.pressing.contact.previous_axis_point += 0.3 * from;
+        if (moves) scene.pressing.contact.patch.previous_axis_point += 0.3 * from;
         scene.pressing.contact.gap = -1;
         const ContactPoint<double> central{0, 0, scene.triangles[0].corners, {0.25, 0.25, 0.5}, {}, {}, {}, {}, {}, -1};
-        scene.pressing.contact.points = {&central, 1};
+        scene.pressing.contact.patch.points = {&central, 1};
         scene.pressing.begin(scene.context);
         REQUIRE(scene.context.points().size() == 1);
         REQUIRE(norm<double>(scene.context.points()[0].normal - from) < 1e-14);
@@ -764,7 +765,7 @@ TEST_CASE("a point presses too", "[press]") {
         stroke.tool.axis.setZero();
         stroke.displacement *= 0.05 / stroke.displacement.norm();
         REQUIRE(press_to_rest(loop, {stroke}));
-        stroke.tool.radius = loop.contact().radius;  // what a point counts as
+        stroke.tool.radius = loop.contact().patch.radius;  // what a point counts as
         CHECK(stroke.tool.radius < 0.02 * mean_edge(unit_sphere()));
         check_tiny_contact(loop, loop.pressed_by({stroke.at(1)}));
     }

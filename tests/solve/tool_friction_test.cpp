@@ -13,10 +13,10 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/core/snapshot.hpp>
 #include <membrane/membrane.hpp>
 #include <membrane/model/moving_foundation.hpp>
-#include <membrane/model/tearable_springs.hpp>
+#include <membrane/replay/snapshot.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 #include <membrane/tear/tearing.hpp>
 
 #include "support/cases.hpp"

@@ -7,12 +7,12 @@
 #include <Eigen/Geometry>
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/contact/contact_tracker.hpp>
-#include <membrane/model/material.hpp>
 #include <membrane/model/moving_foundation.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/moving_body.hpp>
 #include <membrane/surface/shapes.hpp>
 #include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/material.hpp>
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
 

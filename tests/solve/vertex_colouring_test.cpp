@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include <membrane/core/snapshot.hpp>
 #include <membrane/model/mass_spring_network.hpp>
+#include <membrane/replay/snapshot.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

@@ -328,10 +328,10 @@ TEST_CASE("a membrane with a free border comes back from what has gone round it"
         double first_side = 0;
         for (int tick = 0; tick <= stroke.gone; ++tick) {
             scene.tick(stroke.at(tick));
-            if (first_side == 0 && scene.contact.touching()) first_side = scene.contact.side;
+            if (first_side == 0 && scene.contact.touching()) first_side = scene.contact.patch.side;
         }
         Tool<double> tool = stroke.at(stroke.gone);
-        const auto is_lifted = [&] { return scene.contact.touching() && scene.contact.side != first_side; };
+        const auto is_lifted = [&] { return scene.contact.touching() && scene.contact.patch.side != first_side; };
         constexpr int lowering = 400;
         for (int tick = 0; tick < lowering && (is_lifted() || overlaps(fresh, tool)); ++tick) {
             tool.position -= 2.0 / lowering * stroke.out;

@@ -7,17 +7,17 @@
 #include <limits>
 #include <vector>
 
+#include <membrane/certify/passivity.hpp>
 #include <membrane/haptics/contact_friction.hpp>
 #include <membrane/haptics/extrapolated_reaction.hpp>
 #include <membrane/haptics/force_limits.hpp>
 #include <membrane/haptics/grasp_transition.hpp>
 #include <membrane/haptics/handover.hpp>
-#include <membrane/haptics/passivity.hpp>
-#include <membrane/haptics/recording.hpp>
 #include <membrane/haptics/rest_contact.hpp>
-#include <membrane/haptics/simulated_hand.hpp>
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/haptics/virtual_coupling.hpp>
+#include <membrane/replay/recording.hpp>
+#include <membrane/replay/simulated_hand.hpp>
 
 #include "../../examples/openhaptics/units.hpp"
 #include "support/whole_loop.hpp"

@@ -6,11 +6,11 @@
 #include <type_traits>
 #include <vector>
 
-#include <membrane/model/cohesive_springs.hpp>
-#include <membrane/model/material.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/tear/cohesive_springs.hpp>
+#include <membrane/tissue/material.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 #include "support/meshes.hpp"
 

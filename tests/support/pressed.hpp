@@ -54,12 +54,12 @@ struct Pressed {
             tree.refit(x, report.moved);
             force = report.reactions[0];
         }
-        touched.assign(contact.triangles.begin(), contact.triangles.end());
-        candidates.assign(contact.candidates.begin(), contact.candidates.end());
-        points.assign(contact.points.begin(), contact.points.end());
-        contact.points = points;
-        contact.triangles = touched;
-        contact.candidates = candidates;
+        touched.assign(contact.patch.triangles.begin(), contact.patch.triangles.end());
+        candidates.assign(contact.patch.candidates.begin(), contact.patch.candidates.end());
+        points.assign(contact.patch.points.begin(), contact.patch.points.end());
+        contact.patch.points = points;
+        contact.patch.triangles = touched;
+        contact.patch.candidates = candidates;
     }
 
     [[nodiscard]] membrane::Equilibrium rest_from(const membrane::Points<double>& start) const {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include <membrane/model/material.hpp>
+#include <membrane/tissue/material.hpp>
 
 /// Closed forms of a strip in pure shear.
 namespace test {

@@ -3,10 +3,10 @@
 
 #include <vector>
 
-#include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/mass_spring_network.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 namespace test {
 

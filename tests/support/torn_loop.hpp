@@ -12,8 +12,8 @@
 #include <membrane/haptics/handover.hpp>
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/membrane.hpp>
-#include <membrane/model/cohesive_springs.hpp>
 #include <membrane/solve/tool_friction.hpp>
+#include <membrane/tear/cohesive_springs.hpp>
 #include <membrane/tear/tearing.hpp>
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>

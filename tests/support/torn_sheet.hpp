@@ -11,12 +11,12 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/model/material.hpp>
-#include <membrane/model/spring_stiffness.hpp>
-#include <membrane/model/tearable_springs.hpp>
 #include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 #include <membrane/tear/tearing.hpp>
+#include <membrane/tissue/material.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
 

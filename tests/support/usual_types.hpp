@@ -4,12 +4,12 @@
 #include <Eigen/SVD>
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/instantiated.hpp>
-#include <membrane/model/cohesive_springs.hpp>
-#include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/moving_foundation.hpp>
-#include <membrane/model/tearable_springs.hpp>
 #include <membrane/surface/moving_body.hpp>
+#include <membrane/tear/cohesive_springs.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 #include <membrane/tissue/bending_triangles.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
 
 // What most tests are made of beside the types of `membrane::instantiated`. Nothing of accuracy/ is here: its inline
 // functions would have every file instantiate Eigen's sparse solvers.

@@ -131,8 +131,8 @@ void hand_in_wild_number(int seed) {
             switch (which) {
                 case 14: contact.gap = wild; break;
                 case 15: contact.normal[k] = wild; break;
-                case 16: contact.axis_point[k] = wild; break;
-                case 17: contact.previous_axis_point[k] = wild; break;
+                case 16: contact.patch.axis_point[k] = wild; break;
+                case 17: contact.patch.previous_axis_point[k] = wild; break;
                 default: break;
             }
             const auto grasp = grasper.update(contact, now.x, now.tool, body);

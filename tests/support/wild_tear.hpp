@@ -8,12 +8,12 @@
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/contact/grasper.hpp>
-#include <membrane/model/cohesive_springs.hpp>
-#include <membrane/model/foundation_layer.hpp>
 #include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_friction.hpp>
 #include <membrane/surface/normals.hpp>
+#include <membrane/tear/cohesive_springs.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
 
 #include <membrane/surface/shapes.hpp>
 #include <membrane/tissue/tissue.hpp>

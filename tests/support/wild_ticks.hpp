@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <limits>
 
-#include <membrane/haptics/recording.hpp>
+#include <membrane/replay/recording.hpp>
 
 #include "support/random.hpp"
 

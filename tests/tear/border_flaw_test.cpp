@@ -12,7 +12,7 @@
 #include <vector>
 
 #include <membrane/accuracy/equilibrium.hpp>
-#include <membrane/model/tearable_springs.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 #include <membrane/tear/tearing.hpp>
 #include <membrane/tissue/bending.hpp>
 #include <membrane/tissue/tissue.hpp>

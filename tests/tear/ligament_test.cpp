@@ -8,10 +8,10 @@
 #include <limits>
 #include <type_traits>
 
-#include <membrane/model/tearable_springs.hpp>
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 #include <membrane/tear/tearing.hpp>
 
 #include "support/cases.hpp"

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/core/initial_state.hpp>
-#include <membrane/core/snapshot.hpp>
 #include <membrane/mesh_check/validate.hpp>
+#include <membrane/replay/initial_state.hpp>
+#include <membrane/replay/snapshot.hpp>
 #include <membrane/surface/shapes.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
 

@@ -14,14 +14,14 @@
 #include <Eigen/Geometry>
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/contact/contact_tracker.hpp>
-#include <membrane/core/initial_state.hpp>
-#include <membrane/core/snapshot.hpp>
-#include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/moving_foundation.hpp>
-#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/replay/initial_state.hpp>
+#include <membrane/replay/snapshot.hpp>
 #include <membrane/solve/boundary_conditions.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

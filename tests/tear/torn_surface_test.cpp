@@ -11,11 +11,11 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/core/snapshot.hpp>
 #include <membrane/mesh_check/validate.hpp>
-#include <membrane/model/tearable_springs.hpp>
+#include <membrane/replay/snapshot.hpp>
 #include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

@@ -12,10 +12,10 @@
 #include <Eigen/LU>
 #include <Eigen/SparseCholesky>
 
-#include <membrane/core/in_lanes.hpp>
-#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/core/lanes.hpp>
 #include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

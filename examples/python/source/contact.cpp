@@ -47,11 +47,14 @@ void bind_contact_data(py::module_& module) {
         .def_readonly("barycentric", &Contact::barycentric, doc("Contact::barycentric"))
         .def_readonly("point", &Contact::point, doc("Contact::point"))
         .def_readonly("normal", &Contact::normal, doc("Contact::normal"))
-        .def_readonly("side", &Contact::side, doc("Contact::side"))
+        .def_property_readonly(
+            "side", [](const Contact& self) { return self.patch.side; }, doc("ContactPatch::side"))
         .def_readonly("gap", &Contact::gap, doc("Contact::gap"))
         .def_readonly("depth", &Contact::depth, doc("Contact::depth"))
-        .def_readonly("radius", &Contact::radius, doc("Contact::radius"))
-        .def_readonly("tunnelled", &Contact::tunnelled, doc("Contact::tunnelled"));
+        .def_property_readonly(
+            "radius", [](const Contact& self) { return self.patch.radius; }, doc("ContactPatch::radius"))
+        .def_property_readonly(
+            "tunnelled", [](const Contact& self) { return self.patch.tunnelled; }, doc("ContactPatch::tunnelled"));
     py::class_<Grasp>(module, "Grasp", doc("Grasp"))
         .def_property_readonly("holding", &Grasp::holding, doc("Grasp::holding"))
         .def_readonly("triangle", &Grasp::triangle, doc("Grasp::triangle"))

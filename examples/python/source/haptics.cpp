@@ -5,9 +5,9 @@
 #include <pybind11/stl/filesystem.h>
 #include <membrane/haptics/contact_friction.hpp>
 #include <membrane/haptics/force_limits.hpp>
-#include <membrane/haptics/script.hpp>
-#include <membrane/haptics/simulated_hand.hpp>
 #include <membrane/haptics/virtual_coupling.hpp>
+#include <membrane/replay/script.hpp>
+#include <membrane/replay/simulated_hand.hpp>
 
 #include <fstream>
 

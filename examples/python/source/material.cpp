@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/material.hpp>
-#include <membrane/model/recommended_layers.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/material.hpp>
+#include <membrane/tissue/recommended_layers.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 #include "types.hpp"
 

@@ -4,8 +4,8 @@
 
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
-#include <membrane/haptics/recording.hpp>
-#include <membrane/haptics/recording_file.hpp>
+#include <membrane/replay/recording.hpp>
+#include <membrane/replay/recording_file.hpp>
 
 #include "types.hpp"
 

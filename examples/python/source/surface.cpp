@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <pybind11/stl.h>
-#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 #include "loop_call.hpp"
 #include "types.hpp"

@@ -13,11 +13,11 @@
 #include <vector>
 
 #include <membrane/membrane.hpp>
-#include <membrane/model/cohesive_springs.hpp>
-#include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/tearable_springs.hpp>
 #include <membrane/solve/tool_friction.hpp>
+#include <membrane/tear/cohesive_springs.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 #include <membrane/tear/tearing.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
 #include <membrane/tissue/tissue.hpp>
 
 #include "arrays.hpp"

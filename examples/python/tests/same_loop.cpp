@@ -15,14 +15,14 @@
 #include <membrane/calibration/indentation.hpp>
 #include <membrane/certify/error_bound.hpp>
 #include <membrane/haptics/force_limits.hpp>
-#include <membrane/haptics/simulated_hand.hpp>
 #include <membrane/membrane.hpp>
 #include <membrane/meshing/distmesh.hpp>
-#include <membrane/model/cohesive_springs.hpp>
-#include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/replay/simulated_hand.hpp>
 #include <membrane/solve/tool_friction.hpp>
+#include <membrane/tear/cohesive_springs.hpp>
 #include <membrane/tear/tearing.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 #include <membrane/tissue/tissue.hpp>
 
 namespace {

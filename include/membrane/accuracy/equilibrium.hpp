@@ -30,11 +30,11 @@ namespace membrane {
 /// Newton's method on all vertices at once, with exact Hessians and sparse factorisation. Contact points near a tool
 /// are inequalities with exact second derivatives: sequential quadratic programming [Nocedal06] 18. A line search on
 /// the energy plus the largest penetration, weighted as an exact penalty, makes it converge from distant starts. Tools
-/// press the whole surface, not only `contact.triangles`; of a contact it uses position, normal and radius. A tool that
-/// penetrates deeply enters from outside, in one increment for each half radius of depth. Where no vertex can move, a
-/// tool may penetrate and a point attachment may be off its target. A fixed vertex does not yield to a tool: next to
-/// one, the result is the limit of a step's forces for `SolverOptions::rigid_stiffness` to infinity; on a triangle with
-/// three fixed corners, no tool presses here.
+/// press the whole surface, not only the triangles of the contact; of that they use position, normal and radius. A
+/// tool that penetrates deeply enters from outside, in one increment for each half radius of depth. Where no vertex
+/// can move, a tool may penetrate and a point attachment may be off its target. A fixed vertex does not yield to a
+/// tool: next to one, the result is the limit of a step's forces for `SolverOptions::rigid_stiffness` to infinity; on
+/// a triangle with three fixed corners, no tool presses here.
 ///
 /// If there are several equilibria, the start and the increments select one.
 ///

@@ -9,11 +9,11 @@
 #include <type_traits>
 #include <vector>
 
+#include <membrane/accuracy/constraint_term.hpp>
 #include <membrane/accuracy/point_attachments.hpp>
 #include <membrane/core/fixed_vector.hpp>
 #include <membrane/model/mass_spring_network.hpp>
 #include <membrane/model/volume_springs.hpp>
-#include <membrane/solve/constraint_term.hpp>
 
 /// The balance of forces on a membrane of linear springs.
 ///

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include <membrane/accuracy/constraint_term.hpp>
 #include <membrane/accuracy/tool_points.hpp>
-#include <membrane/solve/constraint_term.hpp>
 
 /// The constraints of a membrane in equilibrium, described by those of a step or by user-defined ones: see
 /// `ConstraintTerm`, or
@@ -267,15 +267,15 @@ inline void EquilibriumScene::press(const ConstraintTerm& term) {
     for (const Index v : contact.corners) validate(v);
     validate(contact.point, "contact's point", "m");
     validate(contact.normal, "contact's normal", "1");
-    validate(contact.axis_point, "contact's point of the axis", "m");
-    if (!is_finite(contact.radius) || !(contact.radius > 0)) {
+    validate(contact.patch.axis_point, "contact's point of the axis", "m");
+    if (!is_finite(contact.patch.radius) || !(contact.patch.radius > 0)) {
         refuse(detail::equilibrium_name, "radius of the contact of constraint ", constraint_,
-               " must be finite and positive [m], got ", contact.radius);
+               " must be finite and positive [m], got ", contact.patch.radius);
     }
-    ScenePress pressing{constraint_, tool, Vector3<double>::Zero(), contact.detection_distance};
-    pressing.tool.radius = contact.radius;
+    ScenePress pressing{constraint_, tool, Vector3<double>::Zero(), contact.patch.detection_distance};
+    pressing.tool.radius = contact.patch.radius;
     if (contact.gap < 0)
-        pressing.exit_displacement = contact.point + contact.radius * contact.normal - contact.axis_point;
+        pressing.exit_displacement = contact.point + contact.patch.radius * contact.normal - contact.patch.axis_point;
     tools_.push_back(pressing);
     seeds_.insert(seeds_.end(), contact.corners.begin(), contact.corners.end());
 }

@@ -7,7 +7,7 @@
 #include <limits>
 #include <span>
 
-#include <membrane/solve/constraint_term.hpp>
+#include <membrane/accuracy/constraint_term.hpp>
 
 namespace membrane {
 

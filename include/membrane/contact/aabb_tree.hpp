@@ -133,7 +133,7 @@ class AabbTree : public SplitCount {
     /// node.
     [[nodiscard]] Aabb<Scalar> box(Index node) const noexcept;
 
-    /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the triangles. Then refit the
+    /// Visits what a tear changes, see `replay/snapshot.hpp`: of a mesh with a reserve, the triangles. Then refit the
     /// tree.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {

@@ -23,6 +23,28 @@ struct ContactTriangle {
     std::array<Index, 3> corners;  ///< its vertices
 };
 
+/// The tool and the surface around a contact: what `press`, grasper and smoothing need beside the contact itself.
+template <Real Scalar>
+struct ContactPatch {
+    Vector3<Scalar> axis_point = Vector3<Scalar>::Zero();  ///< of the tool's axis, nearest to the contact point [m]
+    Vector3<Scalar> previous_axis_point = Vector3<Scalar>::Zero();  ///< in the last tick, off the surface [m]
+    Scalar radius = 0;  ///< of the tool [m]; a point tool counts as a small sphere, see `TrackerOptions::margin`
+    Scalar side = 1;    ///< of the tool: 1 if triangles run counter-clockwise seen from it, else -1
+    Scalar detection_distance = 0;  ///< triangles this near to the axis are listed as `triangles` [m]
+    bool tunnelled = false;         ///< the tool passed through the surface at the contact point since the last tick
+    bool closed = false;            ///< whether the surface is closed: its back is its inside
+    bool has_all_points = true;     ///< false if `points` exceeded its capacity: a step refuses this contact
+    Index splits = no_index;  ///< of a tear, that tracker and tree have followed; a step refuses a contact with fewer
+
+    ///@{
+    /// Valid until the tracker's next update: a contact point for each pair of triangle and tool feature within
+    /// `detection_distance`; the triangles within it, by the active one, or on a path through; these and their
+    /// neighbours.
+    std::span<const ContactPoint<Scalar>> points;
+    std::span<const ContactTriangle> triangles, candidates;
+    ///@}
+};
+
 /// The contact of the tool with the membrane: position, depth and phase.
 ///
 /// At equilibrium all triangles that press are equally near, and rounding decides which of them is the active one, with
@@ -38,25 +60,10 @@ struct Contact {
     Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();       ///< of the contact point
     Vector3<Scalar> point = Vector3<Scalar>::Zero();             ///< the contact point, on the present surface [m]
     Vector3<Scalar> normal = Vector3<Scalar>::Zero();            ///< unit vector from the surface to the tool's side
-    Vector3<Scalar> axis_point = Vector3<Scalar>::Zero();        ///< point of the tool's axis nearest to `point` [m]
-    Scalar side = 1;   ///< of the tool: 1 if triangles run counter-clockwise seen from it, else -1
     Scalar gap = 0;    ///< signed distance of the tool from the present surface [m]; negative in penetration
     Scalar depth = 0;  ///< indentation of the tool below the surface without the tool [m], >= 0
-    Scalar detection_distance = 0;  ///< triangles this near to the axis are listed as `triangles` [m]
-    Scalar radius = 0;  ///< of the tool [m]; a point tool counts as a small sphere, see `TrackerOptions::margin`
-    Vector3<Scalar> previous_axis_point =
-        Vector3<Scalar>::Zero();                              ///< `axis_point` in the last tick, off the surface [m]
     Vector3<Scalar> body_velocity = Vector3<Scalar>::Zero();  ///< of a moving body at the contact point [m/s]
-    bool tunnelled = false;  ///< the tool passed through the surface at `point` since the last tick
-
-    // Valid until the tracker's next update.
-    std::span<const ContactPoint<Scalar>>
-        points;  ///< one for each pair of triangle and tool feature within `detection_distance`
-    std::span<const ContactTriangle> triangles;   ///< within `detection_distance`, by the active one, on a path through
-    std::span<const ContactTriangle> candidates;  ///< `triangles`, then those around them
-    bool has_all_points = true;  ///< false if `points` exceeded its capacity: a step refuses this contact
-    bool closed = false;         ///< whether the surface is closed: its back is its inside
-    Index splits = no_index;  ///< of a tear, that tracker and tree have followed; a step refuses a contact with fewer
+    ContactPatch<Scalar> patch = {};                          ///< for `press`
 
     /// No contact: the phase is `none`, there are no triangles and no points.
     [[nodiscard]] static Contact none() noexcept { return {}; }
@@ -71,9 +78,10 @@ struct Contact {
 template <Real Scalar>
 [[nodiscard]] bool is_valid(const Contact<Scalar>& contact) noexcept {
     if (!contact.touching()) return true;
+    const auto& patch = contact.patch;
     return is_finite(contact.barycentric) && is_finite(contact.point) && is_finite(contact.normal) &&
-           is_finite(contact.axis_point) && is_finite(contact.previous_axis_point) && is_finite(contact.gap) &&
-           is_finite(contact.detection_distance) && is_finite(contact.radius) && contact.radius > 0;
+           is_finite(contact.gap) && is_finite(patch.axis_point) && is_finite(patch.previous_axis_point) &&
+           is_finite(patch.detection_distance) && is_finite(patch.radius) && patch.radius > 0;
 }
 
 }  // namespace membrane

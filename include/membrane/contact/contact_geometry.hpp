@@ -32,8 +32,8 @@ Contact<Scalar> contact_in(const LocalSurface<Scalar>& surface, const std::type_
     const auto triangle = surface.triangle(x, f);
     auto nearest = closest_to_axis(triangle, tool);
     Contact<Scalar> contact;
-    contact.side = side;
-    contact.axis_point = tool.position + nearest.fraction * tool.axis;
+    contact.patch.side = side;
+    contact.patch.axis_point = tool.position + nearest.fraction * tool.axis;
     Vector3<Scalar> outward = direction<Scalar>(area_vector(triangle), Vector3<Scalar>::Zero());
     if (nearest.on_triangle.squared_distance == 0 && is_shaft(tool)) {
         // The shaft passes through the triangle: the gap is that of its lower end, if that is not beyond the border.
@@ -41,7 +41,7 @@ Contact<Scalar> contact_in(const LocalSurface<Scalar>& surface, const std::type_
         const Vector3<Scalar> end = is_second ? Vector3<Scalar>(tool.position + tool.axis) : tool.position;
         const Index g = surface.closed() ? f : surface.walk_to_closest(x, f, end);
         if (!surface.on_border(g, closest_point(surface.triangle(x, g), end).barycentric)) {
-            contact.axis_point = end;
+            contact.patch.axis_point = end;
             nearest.on_triangle = closest_point(triangle, end);
         }
     } else {
@@ -51,9 +51,10 @@ Contact<Scalar> contact_in(const LocalSurface<Scalar>& surface, const std::type_
     contact.corners = surface.corners(f);
     contact.barycentric = nearest.on_triangle.barycentric;
     contact.point = nearest.on_triangle.point;
-    const Vector3<Scalar> separation = contact.axis_point - contact.point;
-    if (surface.on_border(f, contact.barycentric)) contact.side = dot(separation, outward) < 0 ? Scalar(-1) : Scalar(1);
-    outward *= contact.side;
+    const Vector3<Scalar> separation = contact.patch.axis_point - contact.point;
+    if (surface.on_border(f, contact.barycentric))
+        contact.patch.side = dot(separation, outward) < 0 ? Scalar(-1) : Scalar(1);
+    outward *= contact.patch.side;
     const Scalar sign = dot(separation, outward) < 0 ? Scalar(-1) : Scalar(1);
     const Scalar distance = norm(separation);
     contact.gap = sign * distance - radius;
@@ -75,11 +76,11 @@ Contact<Scalar> contact_where_passed(const LocalSurface<Scalar>& surface,
     contact.barycentric = barycentric;
     contact.point = point_at(triangle, barycentric);
     contact.normal = side * direction<Scalar>(area_vector(triangle), Vector3<Scalar>::Zero());
-    contact.side = side;
-    contact.previous_axis_point = from;
-    contact.axis_point = to;
+    contact.patch.side = side;
+    contact.patch.previous_axis_point = from;
+    contact.patch.axis_point = to;
     contact.gap = dot<Scalar>(contact.normal, to - contact.point);
-    contact.tunnelled = true;
+    contact.patch.tunnelled = true;
     return contact;
 }
 

@@ -8,7 +8,7 @@
 
 /// Contact points of a surface and a tool.
 ///
-///     for (const auto& point : contact.points) std::printf("gap %g m\n", point.gap);         // found by the tracker
+///     for (const auto& point : contact.patch.points) std::printf("gap %g m\n", point.gap);   // found by the tracker
 ///     for (const auto& point : solver.contact_points(0)) total += point.force;               // after a step [N]
 namespace membrane {
 

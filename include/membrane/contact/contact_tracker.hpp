@@ -13,6 +13,7 @@
 #include <membrane/contact/contact_geometry.hpp>
 #include <membrane/contact/local_surface.hpp>
 #include <membrane/contact/tool.hpp>
+#include <membrane/contact/tool_side.hpp>
 #include <membrane/contact/winding_number.hpp>
 #include <membrane/core/fixed_vector.hpp>
 #include <membrane/core/index_set.hpp>
@@ -95,14 +96,14 @@ class ContactTracker : public SplitCount {
     /// Drops contact, tool and side. Later contacts equal those of a new tracker, bit for bit.
     void reset() noexcept;
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`; of a mesh with a reserve, the triangles as well.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`; of a mesh with a reserve, the triangles, too.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.surface_);
         if (self.surface_.has_reserve()) visit(self.origins_, self.torn_, self.splits_);
         visit(self.near_, self.nearest_, self.nearest_square_, self.last_, self.last_tool_, self.pose_, self.side_,
-              self.slid_off_, self.origin_triangles_, self.entry_normal_, self.beyond_middle_, self.ticks_,
-              self.full_query_count_, self.rebound_ticks_);
+              self.origin_triangles_, self.entry_normal_, self.beyond_middle_, self.ticks_, self.full_query_count_,
+              self.rebound_ticks_);
     }
 
   private:
@@ -123,10 +124,12 @@ class ContactTracker : public SplitCount {
     [[nodiscard]] Scene scene_of(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                  const Tool<Scalar>& tool, const ConstPointsRef<Scalar>& anchors) const noexcept;
     [[nodiscard]] Scalar expected_side() const noexcept {
-        return side_ != 0 ? side_ : last_.touching() ? last_.side : Scalar(1);
+        return side_.known() ? side_.sign() : last_.touching() ? last_.patch.side : Scalar(1);
     }
     // Whether the tool may still approach an open surface from either side.
-    [[nodiscard]] bool side_is_open() const noexcept { return !surface_.closed() && !last_.touching() && side_ == 0; }
+    [[nodiscard]] bool side_is_open() const noexcept {
+        return !surface_.closed() && !last_.touching() && !side_.known();
+    }
     [[nodiscard]] bool is_clear(const Scene& scene) const noexcept;
     bool follow(const Scene& scene, Contact<Scalar>& contact) noexcept;
     bool find(const Scene& scene, Contact<Scalar>& contact) noexcept;
@@ -173,7 +176,7 @@ class ContactTracker : public SplitCount {
     }
     [[nodiscard]] bool is_below_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
     [[nodiscard]] bool leaves_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
-    void decide_side(const Scene& scene, const Contact<Scalar>& contact) noexcept;
+    [[nodiscard]] bool is_side_certain(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
     [[nodiscard]] bool is_hooked(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
 
     // After tunnelling the membrane springs back and may fold over the tool: for some ticks candidates include more
@@ -204,9 +207,8 @@ class ContactTracker : public SplitCount {
     Contact<Scalar> last_;
     std::optional<Tool<Scalar>> last_tool_;
     RigidFrame<Scalar> pose_;  // of the body at the last update
-    Scalar side_ = 0;          // of the tool, 1 or -1; 0: not yet known
-    bool torn_ = false;        // whether a vertex has become two
-    bool slid_off_ = false;    // whether a shaft has slid off a displaced border: its parts may be on different sides
+    ToolSide<Scalar> side_;
+    bool torn_ = false;  // whether a vertex has become two
     // The triangles of the rest surface nearest to the tool's two ends and its axis point.
     std::array<Index, 3> origin_triangles_{no_index, no_index, no_index};
     Vector3<Scalar> entry_normal_ = Vector3<Scalar>::Zero();  // at rest, of the wall where the tool entered; 0: none
@@ -253,8 +255,7 @@ void ContactTracker<Scalar>::reset() noexcept {
     last_ = {};
     last_tool_.reset();
     pose_ = {};
-    side_ = 0;
-    slid_off_ = false;
+    side_ = {};
     origin_triangles_.fill(no_index);
     entry_normal_.setZero();
     beyond_middle_ = false;
@@ -283,7 +284,7 @@ void ContactTracker<Scalar>::move_with_body(const RigidFrame<Scalar>& pose) noex
         last_tool_->position = motion.point_to_world(last_tool_->position);
         last_tool_->axis = motion.vector_to_world(last_tool_->axis);
     }
-    for (auto* stored : {&last_.point, &last_.axis_point, &last_.previous_axis_point})
+    for (auto* stored : {&last_.point, &last_.patch.axis_point, &last_.patch.previous_axis_point})
         *stored = motion.point_to_world(*stored);
     last_.normal = motion.vector_to_world(last_.normal);
     entry_normal_ = motion.vector_to_world(entry_normal_);
@@ -303,13 +304,11 @@ Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, cons
     if ((followed || find(scene, contact)) && contacts(scene, contact)) {
         complete(scene, contact);
         contact.phase = before ? ContactPhase::ongoing : ContactPhase::began;
-        decide_side(scene, contact);
-        slid_off_ = slid_off_ || (is_shaft(tool) && leaves_border(scene, contact));
+        side_.touch(contact.patch.side, side_.known() || is_side_certain(scene, contact),
+                    is_shaft(tool) && leaves_border(scene, contact));
     } else {
-        if ((side_ != 0 || slid_off_) && !tool.grasping) {
-            const bool clear = is_clear(scene);
-            slid_off_ = slid_off_ && !clear;
-            if (clear || leaves_border(scene, contact)) side_ = 0;
+        if ((side_.known() || side_.slid_off()) && !tool.grasping) {
+            side_.leave(is_clear(scene), leaves_border(scene, contact));
         }
         near_.clear();
         origin_triangles_.fill(no_index);
@@ -318,11 +317,11 @@ Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, cons
         contact = {};
         contact.phase = before ? ContactPhase::ended : ContactPhase::none;
     }
-    contact.splits = (std::min)(tree.splits(), splits_);
+    contact.patch.splits = (std::min)(tree.splits(), splits_);
     last_tool_ = tool;
     last_ = contact;
-    last_.triangles = last_.candidates = {};  // valid until the next update only
-    last_.points = {};
+    last_.patch.triangles = last_.patch.candidates = {};  // valid until the next update only
+    last_.patch.points = {};
     return contact;
 }
 
@@ -359,7 +358,7 @@ bool ContactTracker<Scalar>::follow(const Scene& scene, Contact<Scalar>& contact
     }
     if (near_.empty()) return false;
 
-    contact.side = expected_side();
+    contact.patch.side = expected_side();
     if (!sweep_test(scene, contact)) describe(scene, nearest_, contact);
     return true;
 }
@@ -375,7 +374,7 @@ bool ContactTracker<Scalar>::find(const Scene& scene, Contact<Scalar>& contact) 
     if (!sweep_test(scene, contact)) {
         const Index f = near_.empty() ? scene.tree.closest_point(scene.x, scene.tool.position).triangle : nearest_;
         if (f == no_index) return false;
-        contact.side = expected_side();
+        contact.patch.side = expected_side();
         describe(scene, f, contact);
     }
     return true;
@@ -385,7 +384,7 @@ bool ContactTracker<Scalar>::find(const Scene& scene, Contact<Scalar>& contact) 
 template <Real Scalar>
 bool ContactTracker<Scalar>::contacts(const Scene& scene, Contact<Scalar>& contact) noexcept {
     if (!last_.touching() && contact.gap > 0) return false;
-    if (contact.gap > 0 && (slid_off_ || is_below_border(scene, contact))) return false;
+    if (contact.gap > 0 && (side_.slid_off() || is_below_border(scene, contact))) return false;
     const Scalar rebound = measure_depth(scene, contact);
     if (is_hooked(scene, contact)) return false;
     if (!last_.touching()) return true;
@@ -405,12 +404,12 @@ bool ContactTracker<Scalar>::sweep_test(const Scene& scene, Contact<Scalar>& con
         if (std::abs(passed.gap) <= detail::rounding_at(now)) return false;  // it ends on the surface
         if (passed.gap > 0) {
             if (hit.fraction < negligible_part) return false;  // it leaves the surface it was on
-            if ((surface_.closed() || side_ != 0) && has_passed(scene, hit.triangle, side, from))
+            if ((surface_.closed() || side_.known()) && has_passed(scene, hit.triangle, side, from))
                 return false;  // it leaves the inside
             // From back to front: a penetration from the other side, in a concave fold or of an open surface.
             passed.normal = -passed.normal;
             passed.gap = -passed.gap;
-            if (side_is_open() && was_behind(scene, hit.triangle, side, from)) passed.side = -side;
+            if (side_is_open() && was_behind(scene, hit.triangle, side, from)) passed.patch.side = -side;
         }
         const auto end = where_it_ends(scene, passed);
         if (end && end->gap >= 0) return false;  // it has grazed the surface
@@ -428,13 +427,13 @@ bool ContactTracker<Scalar>::sweep_test(const Scene& scene, Contact<Scalar>& con
 template <Real Scalar>
 std::optional<Contact<Scalar>> ContactTracker<Scalar>::where_it_ends(const Scene& scene,
                                                                      const Contact<Scalar>& passed) const noexcept {
-    const Vector3<Scalar>& q = passed.axis_point;
+    const Vector3<Scalar>& q = passed.patch.axis_point;
     if (last_.touching() || squared_norm<Scalar>(q - passed.point) < 2 * passed.gap * passed.gap) return std::nullopt;
     const Index f = surface_.walk_to_closest(scene.x, passed.triangle, q);
-    auto there = contact_in(surface_, scene.x, f, Tool<Scalar>{.position = q}, Scalar(0), passed.side);
+    auto there = contact_in(surface_, scene.x, f, Tool<Scalar>{.position = q}, Scalar(0), passed.patch.side);
     if (surface_.on_border(f, there.barycentric) || !(dot(there.normal, passed.normal) > 0)) return std::nullopt;
-    there.previous_axis_point = there.point + margin_ * there.normal;
-    there.tunnelled = true;
+    there.patch.previous_axis_point = there.point + margin_ * there.normal;
+    there.patch.tunnelled = true;
     return there;
 }
 
@@ -443,9 +442,10 @@ template <Real Scalar>
 void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept {
     const auto seen_from = [&](Scalar side) {
         contact = contact_in(surface_, scene.x, f, scene.tool, scene.radius, side);
-        return contact.gap < -scene.radius - detail::rounding_at(contact.axis_point);  // not on the surface itself
+        return contact.gap <
+               -scene.radius - detail::rounding_at(contact.patch.axis_point);  // not on the surface itself
     };
-    const Scalar side = contact.side;
+    const Scalar side = contact.patch.side;
     bool behind = seen_from(side);
     // A shaft beside a border may extend to both sides: its middle in the last tick determines the side.
     const Tool<Scalar>& before = last_tool_ ? *last_tool_ : scene.tool;
@@ -453,8 +453,8 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
     if (behind && side_is_open() && was_behind(scene, f, side, middle)) behind = seen_from(-1);
     // At more than the radius from the surface the tool does not touch it: `sweep_test` has shown that no end passed.
     if (side_is_open() && contact.gap < -2 * scene.radius) return turn(scene, contact);
-    if (side_ != 0 && contact.side != side_) {  // beside a border
-        contact.side = side_;
+    if (side_.known() && contact.patch.side != side_.sign()) {  // beside a border
+        contact.patch.side = side_.sign();
         behind = !leaves_border(scene, contact);
         if (behind) turn(scene, contact);
     }
@@ -462,13 +462,15 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
                                      !surface_.closed() && !surface_.on_border(contact.triangle, contact.barycentric);
     // A shaft first seen across a closed surface has come in anywhere: `describe_shaft` finds where it is inside.
     const bool first_seen_across = !last_.touching() && surface_.closed() && pierces(scene, f);
-    contact.tunnelled = behind && !slid_off_ && !first_seen_across &&
-                        (first_seen_in_shaft || has_passed(scene, contact.triangle, contact.side, contact.axis_point));
-    if (behind && !contact.tunnelled) turn(scene, contact);
-    if (!contact.tunnelled && is_shaft(scene.tool) && !slid_off_ && !leaves_border(scene, contact)) {
+    contact.patch.tunnelled =
+        behind && !side_.slid_off() && !first_seen_across &&
+        (first_seen_in_shaft || has_passed(scene, contact.triangle, contact.patch.side, contact.patch.axis_point));
+    if (behind && !contact.patch.tunnelled) turn(scene, contact);
+    if (!contact.patch.tunnelled && is_shaft(scene.tool) && !side_.slid_off() && !leaves_border(scene, contact)) {
         describe_shaft(scene, f, side, contact);
     }
-    contact.previous_axis_point = (contact.tunnelled ? contact.point : contact.axis_point) + margin_ * contact.normal;
+    contact.patch.previous_axis_point =
+        (contact.patch.tunnelled ? contact.point : contact.patch.axis_point) + margin_ * contact.normal;
 }
 
 // Whether `q` is behind the surface without the tool.
@@ -484,14 +486,14 @@ template <Real Scalar>
 void ContactTracker<Scalar>::describe_shaft(const Scene& scene, Index f, Scalar side,
                                             Contact<Scalar>& contact) const noexcept {
     const auto take_if_behind = [&](const Vector3<Scalar>& q) {
-        if (contact.tunnelled || !has_passed(scene, f, side, q)) return;
+        if (contact.patch.tunnelled || !has_passed(scene, f, side, q)) return;
         const Index g = surface_.walk_to_closest(scene.x, f, q);
         auto there = contact_in(surface_, scene.x, g, Tool<Scalar>{.position = q}, scene.radius, side);
-        const bool seen_behind = there.side == side && there.gap < -scene.radius;
-        there.side = side;
+        const bool seen_behind = there.patch.side == side && there.gap < -scene.radius;
+        there.patch.side = side;
         if (leaves_border(scene, there)) return;
         if (!seen_behind) turn(scene, there);
-        there.tunnelled = true;
+        there.patch.tunnelled = true;
         contact = there;
     };
     if (const auto middle = middle_inside(scene, f, side)) take_if_behind(*middle);
@@ -499,7 +501,7 @@ void ContactTracker<Scalar>::describe_shaft(const Scene& scene, Index f, Scalar 
     const Vector3<Scalar> end = scene.tool.position + scene.tool.axis;
     if (surface_.closed()) {
         if (!pierces(scene, f)) return;
-    } else if (side_ == 0 || scene.tree.first_hit(scene.x, scene.tool.position, end).triangle == no_index) {
+    } else if (!side_.known() || scene.tree.first_hit(scene.x, scene.tool.position, end).triangle == no_index) {
         return;
     }
     take_if_behind(scene.tool.position);
@@ -592,21 +594,21 @@ void ContactTracker<Scalar>::complete(const Scene& scene, Contact<Scalar>& conta
     // Triangles not yet within detection distance that may approach the tool as the membrane moves.
     near_.insert(contact.triangle);
     surface_.around_corners(contact.triangle, [&](Index f) { near_.insert(f); });
-    if (contact.tunnelled) {
-        scene.tree.overlap_capsule(scene.x, contact.previous_axis_point, contact.axis_point, Scalar(0),
+    if (contact.patch.tunnelled) {
+        scene.tree.overlap_capsule(scene.x, contact.patch.previous_axis_point, contact.patch.axis_point, Scalar(0),
                                    [&](Index f) { near_.insert(f); });
     }
-    rebound_ticks_ = contact.tunnelled ? ticks_after_tunnelling : (std::max)(rebound_ticks_ - 1, 0);
+    rebound_ticks_ = contact.patch.tunnelled ? ticks_after_tunnelling : (std::max)(rebound_ticks_ - 1, 0);
     collect_candidates(rebound_ticks_ > 0 ? candidate_rings_after_tunnelling : candidate_rings);
     listed_.clear();
     for (const Index f : candidates_.items()) listed_.try_push_back({f, surface_.corners(f)});
-    contact.closed = surface_.closed();
-    contact.radius = scene.radius;
-    contact.detection_distance = scene.detection_distance;
-    contact.candidates = listed_.items();
-    contact.triangles = contact.candidates.first(near_.items().size());
+    contact.patch.closed = surface_.closed();
+    contact.patch.radius = scene.radius;
+    contact.patch.detection_distance = scene.detection_distance;
+    contact.patch.candidates = listed_.items();
+    contact.patch.triangles = contact.patch.candidates.first(near_.items().size());
     find_points(scene, contact);
-    contact.points = points_.items();
+    contact.patch.points = points_.items();
 }
 
 // The contact points within detection distance; after tunnelling all points, as the next positions are unknown.
@@ -614,12 +616,12 @@ template <Real Scalar>
 void ContactTracker<Scalar>::find_points(const Scene& scene, Contact<Scalar>& contact) noexcept {
     points_.clear();
     const auto list = [&](const ContactPoint<Scalar>& point) {
-        if (!contact.tunnelled && point.gap + scene.radius > scene.detection_distance) return;
-        if (!points_.try_push_back(point)) contact.has_all_points = false;
+        if (!contact.patch.tunnelled && point.gap + scene.radius > scene.detection_distance) return;
+        if (!points_.try_push_back(point)) contact.patch.has_all_points = false;
     };
     const int features = feature_pairs(scene.tool);
-    if (features == 1) return find_points_of_sphere(scene, contact.triangles, list);
-    for (const auto& [f, corners] : contact.triangles) {
+    if (features == 1) return find_points_of_sphere(scene, contact.patch.triangles, list);
+    for (const auto& [f, corners] : contact.patch.triangles) {
         const auto triangle = triangle_at(scene.x, corners);
         for (int feature = 0; feature < features; ++feature) {
             const auto point = contact_point(f, corners, triangle, scene.tool, feature, scene.radius);
@@ -684,7 +686,7 @@ void ContactTracker<Scalar>::collect_candidates(int rings) noexcept {
 template <Real Scalar>
 Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept {
     const std::array<Vector3<Scalar>, 3> probes{scene.tool.position, scene.tool.position + scene.tool.axis,
-                                                contact.axis_point};
+                                                contact.patch.axis_point};
     const bool below_border = is_below_border(scene, contact);  // there the sign of the height means nothing
     const auto cosine = [&](Index f) { return dot(rest_normal(scene, f), entry_normal_); };
     const auto faces = [&](Index f) { return cosine(f) > alike; };
@@ -699,7 +701,7 @@ Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>
     for (std::size_t i = 0; i < (is_shaft(scene.tool) ? 3U : 1U); ++i) {
         const Index start = origin_triangles_[i] == no_index ? contact.triangle : origin_triangles_[i];
         Index& f = origin_triangles_[i] = at_rest().walk_to_closest(scene.anchors, start, probes[i]);
-        Scalar height = contact.side * at_rest().height(scene.anchors, f, probes[i]);
+        Scalar height = contact.patch.side * at_rest().height(scene.anchors, f, probes[i]);
         if (below_border) height = std::abs(height);
         if (!faces(f) && !(beyond_middle_ && std::any_of(nearby.begin(), nearby.end(), faces))) {
             entry_normal_ = mean_touched_normal(scene, touched);
@@ -709,7 +711,7 @@ Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>
         if (!below_border && !faces(f) && !is_beside) {
             const Index of_entry =
                 at_rest().walk_to_closest(scene.anchors, faces(start) ? start : contact.triangle, probes[i], faces);
-            const Scalar entered = contact.side * at_rest().height(scene.anchors, of_entry, probes[i]);
+            const Scalar entered = contact.patch.side * at_rest().height(scene.anchors, of_entry, probes[i]);
             // A tool that jumps out of a body has gone through it, and one that is farther beyond it than it is thick.
             if ((beyond_middle_ || height <= 0) && height < -entered / 2)
                 beyond = true, outward = std::abs(height), f = of_entry, height = entered;
@@ -745,7 +747,7 @@ Scalar ContactTracker<Scalar>::depth_of_shaft(const Scene& scene, const Contact<
         }
         f = at_rest().walk_to_closest(scene.anchors, f, q);
         const auto nearest = closest_point(at_rest().triangle(scene.anchors, f), q);
-        const Vector3<Scalar> outward = contact.side * at_rest().outward(scene.anchors, f, nearest.barycentric);
+        const Vector3<Scalar> outward = contact.patch.side * at_rest().outward(scene.anchors, f, nearest.barycentric);
         const Vector3<Scalar> separation = q - nearest.point;
         const Scalar sign = dot(separation, outward) < 0 ? Scalar(-1) : Scalar(1);
         return Depth{fraction, -sign * norm(separation), -dot(axis, direction<Scalar>(sign * separation, outward)), f};
@@ -789,23 +791,21 @@ bool ContactTracker<Scalar>::is_clear(const Scene& scene) const noexcept {
     return clear;
 }
 
-// Beside a border the tool may be on either side. The side is known once the contact is not on a border, or its normal
-// is within 60 degrees of the surface's. The tool keeps it until it is clear of the surface or has slid off a displaced
-// border; it cannot slide around a border that is not displaced.
+// Beside a border the tool may be on either side. The side is certain if the contact is not on a border, or its normal
+// is within 60 degrees of the surface's. The tool cannot slide around a border that is not displaced.
 template <Real Scalar>
-void ContactTracker<Scalar>::decide_side(const Scene& scene, const Contact<Scalar>& contact) noexcept {
-    if (side_ != 0) return;
+bool ContactTracker<Scalar>::is_side_certain(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
     const auto outward = surface_.outward(scene.x, contact.triangle, contact.barycentric);
-    const bool above = contact.side * dot<Scalar>(contact.normal, outward) > Scalar(0.5);
-    if (above || !surface_.on_border(contact.triangle, contact.barycentric)) side_ = contact.side;
+    const bool above = contact.patch.side * dot<Scalar>(contact.normal, outward) > Scalar(0.5);
+    return above || !surface_.on_border(contact.triangle, contact.barycentric);
 }
 
 // Whether the tool is beside a border and below it.
 template <Real Scalar>
 bool ContactTracker<Scalar>::is_below_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
-    if (contact.tunnelled || !surface_.on_border(contact.triangle, contact.barycentric)) return false;
+    if (contact.patch.tunnelled || !surface_.on_border(contact.triangle, contact.barycentric)) return false;
     const auto outward = surface_.outward(scene.x, contact.triangle, contact.barycentric);
-    return contact.side * dot<Scalar>(contact.normal, outward) < 0;
+    return contact.patch.side * dot<Scalar>(contact.normal, outward) < 0;
 }
 
 // Whether the tool is below a border that is displaced by more than the margin.
@@ -829,8 +829,8 @@ bool ContactTracker<Scalar>::is_hooked(const Scene& scene, const Contact<Scalar>
         return false;
     }
     const Index f = origin_triangles_[is_shaft(scene.tool) ? 2 : 0];
-    const auto nearest = closest_point(at_rest().triangle(scene.anchors, f), contact.axis_point);
-    return dot<Scalar>(contact.normal, contact.axis_point - nearest.point) < 0;
+    const auto nearest = closest_point(at_rest().triangle(scene.anchors, f), contact.patch.axis_point);
+    return dot<Scalar>(contact.normal, contact.patch.axis_point - nearest.point) < 0;
 }
 
 }  // namespace membrane

@@ -61,7 +61,7 @@ class FacetCorrection {
     /// The displacement of the tool from where it is to where it must press, along `reaction`, the force on it [N];
     /// zero without a contact or a force, or if a number is not finite or a vertex not there. `contact` is the one that
     /// the step had, `x` the positions [m].
-    /// Online. Cost: linear in `contact.triangles`.
+    /// Online. Cost: linear in `contact.patch.triangles`.
     [[nodiscard]] Vector3<Scalar> operator()(const ConstPointsRef<Scalar>& x, const Contact<Scalar>& contact,
                                              const Vector3<Scalar>& reaction) const noexcept;
 
@@ -70,7 +70,7 @@ class FacetCorrection {
         edge_[static_cast<std::size_t>(split.copy)] = edge_[static_cast<std::size_t>(split.vertex)];
     }
 
-    /// Visits what a tear changes, see `core/snapshot.hpp`.
+    /// Visits what a tear changes, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.edge_);
@@ -123,10 +123,10 @@ template <Real Scalar>
                                    const Vector3<Scalar>& direction) noexcept {
     Foot<Scalar> foot{contact.corners, contact.barycentric};
     Scalar best = -1;
-    for (const auto& listed : contact.triangles) {
+    for (const auto& listed : contact.patch.triangles) {
         const auto at = triangle_at(x, listed.corners);
-        const Vector3<Scalar> a = at.a - contact.axis_point, b = at.b - contact.axis_point,
-                              c = at.c - contact.axis_point;
+        const Vector3<Scalar> a = at.a - contact.patch.axis_point, b = at.b - contact.patch.axis_point,
+                              c = at.c - contact.patch.axis_point;
         Vector3<Scalar> weights(dot(direction, cross(b, c)), dot(direction, cross(c, a)), dot(direction, cross(a, b)));
         const Scalar sum = (weights[0] + weights[1]) + weights[2];
         if (sum == 0) continue;
@@ -204,7 +204,7 @@ Vector3<Scalar> FacetCorrection<Scalar>::operator()(const ConstPointsRef<Scalar>
     if (!contact.touching() || !is_finite(force) || !(force > 0)) return Vector3<Scalar>::Zero();
     const auto is_here = [&](const auto& at) { return are_vertices(at.corners, x.cols()); };
     const bool fits = static_cast<std::size_t>(x.cols()) == edge_.size() && is_here(contact) &&
-                      std::all_of(contact.triangles.begin(), contact.triangles.end(), is_here);
+                      std::all_of(contact.patch.triangles.begin(), contact.patch.triangles.end(), is_here);
     if (!fits) return Vector3<Scalar>::Zero();
     const Vector3<Scalar> direction = reaction / force;
     const auto foot = detail::foot_of(x, contact, direction);
@@ -213,7 +213,7 @@ Vector3<Scalar> FacetCorrection<Scalar>::operator()(const ConstPointsRef<Scalar>
         edge += static_cast<double>(foot.weights[static_cast<Eigen::Index>(k)] *
                                     edge_[static_cast<std::size_t>(foot.corners[k])]);
     }
-    const double radius = contact.radius, a = contact_radius(radius, force);
+    const double radius = contact.patch.radius, a = contact_radius(radius, force);
     const double depth = facet_depth(a / edge, foot.weights.template cast<double>()) * (a * a / radius);
     if (!is_finite(depth)) return Vector3<Scalar>::Zero();
     return static_cast<Scalar>(depth) * direction;

@@ -109,7 +109,7 @@ class Grasper {
         dissipated_ = 0;
     }
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`; of a mesh with a reserve, the rest surface as
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`; of a mesh with a reserve, the rest surface as
     /// well.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
@@ -170,16 +170,16 @@ void Grasper<Scalar>::take_point(const Contact<Scalar>& contact, const ConstPoin
         grasp_.barycentric = barycentric;
     };
     hold(contact.triangle, contact.corners, contact.barycentric);
-    if (contact.tunnelled) return;
+    if (contact.patch.tunnelled) return;
     constexpr Scalar infinity = std::numeric_limits<Scalar>::infinity();
     Scalar least = infinity, sum = 0, nearest = infinity;
-    for (const auto& point : contact.points) least = (std::min)(least, point.gap);
+    for (const auto& point : contact.patch.points) least = (std::min)(least, point.gap);
     Vector3<Scalar> normal = Vector3<Scalar>::Zero(), axis_point = Vector3<Scalar>::Zero();
-    for (const auto& point : contact.points) {
-        const Scalar weight = 1 - 64 * (point.gap - least) / contact.radius;
+    for (const auto& point : contact.patch.points) {
+        const Scalar weight = 1 - 64 * (point.gap - least) / contact.patch.radius;
         if (!(weight > 0)) continue;
         const Vector3<Scalar> here =
-            point_at(triangle_at(x, point.corners), point.weights) + (point.gap + contact.radius) * point.normal;
+            point_at(triangle_at(x, point.corners), point.weights) + (point.gap + contact.patch.radius) * point.normal;
         sum += weight;
         normal += weight * point.normal;
         axis_point += weight * here;
@@ -189,9 +189,9 @@ void Grasper<Scalar>::take_point(const Contact<Scalar>& contact, const ConstPoin
         hold(point.triangle, point.corners, point.weights);
     }
     if (!(sum > 1) || !(norm(normal) > sum / 8)) return;
-    const Vector3<Scalar> from = axis_point / sum, to = from - 4 * contact.radius * direction(normal, normal);
+    const Vector3<Scalar> from = axis_point / sum, to = from - 4 * contact.patch.radius * direction(normal, normal);
     Scalar first = infinity;
-    for (const auto& [triangle, corners] : contact.candidates) {
+    for (const auto& [triangle, corners] : contact.patch.candidates) {
         const auto hit = first_hit(triangle_at(x, corners), from, to);
         if (!hit || !(hit->fraction < first)) continue;
         first = hit->fraction;

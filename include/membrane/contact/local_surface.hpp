@@ -111,7 +111,7 @@ class LocalSurface {
     /// Whether a vertex of the mesh had no triangles, see `surface/vertex_split.hpp`.
     [[nodiscard]] bool has_reserve() const noexcept { return has_reserve_; }
 
-    /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the triangles.
+    /// Visits what a tear changes, see `replay/snapshot.hpp`: of a mesh with a reserve, the triangles.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         if (self.has_reserve_) visit(self.triangles_, self.adjacency_);

@@ -65,7 +65,7 @@ class CompressedRows {
     }
     ///@}
 
-    /// Visits rows and items, see `core/snapshot.hpp`.
+    /// Visits rows and items, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.rows_, self.items_);

@@ -18,7 +18,7 @@ struct RigidFrame {
     Vector3<Scalar> velocity = Vector3<Scalar>::Zero();                              ///< of the origin [m/s]
     Vector3<Scalar> angular_velocity = Vector3<Scalar>::Zero();                      ///< in the world [rad/s]
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.rotation, self.origin, self.velocity, self.angular_velocity);

@@ -54,7 +54,7 @@ class Watchdog {
     /// `state`: a number that changes with each solve; `dt` since the last call [s].
     double update(std::uint64_t state, double dt) noexcept;
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.age_, self.state_);
@@ -78,7 +78,7 @@ class SoftStart {
     /// The last factor, 0 to 1.
     [[nodiscard]] double gain() const noexcept { return gain_; }
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.gain_);
@@ -110,7 +110,7 @@ class MotorThermalModel {
     /// continuous force at a load of 1.
     [[nodiscard]] double max_force() const noexcept;
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.thermal_load_);
@@ -170,7 +170,7 @@ class ForceLimiter {
     /// As new, except for the thermal load. For a replay construct a new limiter.
     void reset() noexcept;
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.watchdog_, self.soft_start_, self.heat_, self.active_limits_, self.began_, self.time_, self.force_);

@@ -66,7 +66,7 @@ class RestContact {
     }
     ///@}
 
-    /// Visits what a tear changes, see `core/snapshot.hpp`.
+    /// Visits what a tear changes, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.at_rest_, self.torn_);
@@ -94,7 +94,7 @@ Contact<Scalar> RestContact<Scalar>::contact_with(const ConstPointsRef<Scalar>& 
     Contact<Scalar> lowest;
     const bool closed = surface_.closed() && !torn_;
     if (anchors.cols() != at_rest_.cols() || !is_valid(tool) || (!closed && !contact.touching())) return lowest;
-    const Scalar side = closed ? Scalar(1) : contact.side;
+    const Scalar side = closed ? Scalar(1) : contact.patch.side;
     const int points = is_shaft(tool) ? points_along_shaft : 1;
     for (int i = 0; i < points; ++i) {
         const Scalar along = points == 1 ? Scalar(0) : static_cast<Scalar>(i) / static_cast<Scalar>(points - 1);
@@ -104,7 +104,7 @@ Contact<Scalar> RestContact<Scalar>::contact_with(const ConstPointsRef<Scalar>& 
     }
     if (lowest.triangle == no_index) return lowest;
     lowest.gap -= tool.radius;
-    lowest.radius = tool.radius;
+    lowest.patch.radius = tool.radius;
     if (!(lowest.gap < 0)) return lowest;
     lowest.depth = -lowest.gap;
     lowest.phase = contact.touching() ? contact.phase : ContactPhase::ongoing;
@@ -122,8 +122,8 @@ Contact<Scalar> RestContact<Scalar>::contact_of(const Vector3<Scalar>& q, Scalar
     contact.corners = surface_.corners(nearest.triangle);
     contact.barycentric = nearest.barycentric;
     contact.point = nearest.point;
-    contact.axis_point = contact.previous_axis_point = q;
-    contact.side = side;
+    contact.patch.axis_point = contact.patch.previous_axis_point = q;
+    contact.patch.side = side;
     const Vector3<Scalar> separation = q - nearest.point;
     const Vector3<Scalar> outward = side * surface_.outward(anchors, nearest.triangle, nearest.barycentric);
     // Beyond a border there is no inside.

@@ -59,7 +59,7 @@ class SmoothContact {
     void reshape(const MovedVertex<Scalar>& moved) noexcept { at_rest_.col(moved.vertex) = moved.rest; }
     ///@}
 
-    /// Visits what a tear changes, see `core/snapshot.hpp`.
+    /// Visits what a tear changes, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.at_rest_);
@@ -115,8 +115,8 @@ Contact<Scalar> SmoothContact<Scalar>::over(const Contact<Scalar>& contact, cons
     if (!contact.touching() || !is_valid(contact) || contact.triangle >= triangles_.cols()) return contact;
     if (anchors.cols() != at_rest_.cols() || normals.cols() != at_rest_.cols()) return contact;
     Contact<Scalar> smooth = contact;
-    const Vector3<Scalar> normal = normal_at(contact.triangle, contact.axis_point, anchors, normals);
-    if (is_finite(normal)) smooth.normal = direction<Scalar>(contact.side * normal, contact.normal);
+    const Vector3<Scalar> normal = normal_at(contact.triangle, contact.patch.axis_point, anchors, normals);
+    if (is_finite(normal)) smooth.normal = direction<Scalar>(contact.patch.side * normal, contact.normal);
     return smooth;
 }
 

@@ -7,7 +7,6 @@
 #include <limits>
 
 #include <membrane/core/check.hpp>
-#include <membrane/core/in_lanes.hpp>
 #include <membrane/core/lanes.hpp>
 #include <membrane/core/types.hpp>
 

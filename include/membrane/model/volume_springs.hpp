@@ -11,7 +11,6 @@
 #include <vector>
 
 #include <membrane/core/field.hpp>
-#include <membrane/core/in_lanes.hpp>
 #include <membrane/core/lanes.hpp>
 #include <membrane/core/symmetric3.hpp>
 #include <membrane/model/elastic_network.hpp>
@@ -237,7 +236,7 @@ class VirtualVolumeSprings : public SplitCount {
     void reshape(const MovedVertex<Scalar>& moved) noexcept { anchors_.col(moved.vertex) = moved.rest; }
     ///@}
 
-    /// Visits what a tear changes, see `core/snapshot.hpp`.
+    /// Visits what a tear changes, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.anchors_, self.stiffness_, self.damping_, self.splits_);

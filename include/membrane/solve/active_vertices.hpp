@@ -91,7 +91,7 @@ class ActiveVertices {
     /// Makes all asleep, and the queue empty. The next step builds it anew.
     void clear() noexcept;
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         if constexpr (Visit::restores) self.clear();

@@ -149,8 +149,8 @@ template <Real Scalar>
 class ConstraintList {
   public:
     /// Keeps references to both.
-    ConstraintList(ConstraintContext<Scalar>& context, std::span<const ConstraintRef<Scalar>> constraints) noexcept
-        : context_(context), constraints_(constraints) {}
+    ConstraintList(ConstrainedStep<Scalar>& step, std::span<const ConstraintRef<Scalar>> constraints) noexcept
+        : step_(step), constraints_(constraints) {}
 
     /// Number of the first constraint that is not valid; `no_index`: all are.
     [[nodiscard]] Index first_invalid() const noexcept {
@@ -164,23 +164,24 @@ class ConstraintList {
     }
     /// Begins all constraints. A vertex that one prescribes is fixed for all, in any order of the arguments.
     void begin() const noexcept {
-        for_each([this](const auto& constraint, std::size_t) { constraint.prescribe(context_); });
-        for_each([this](const auto& constraint, std::size_t) {
-            context_.begin_points();
-            constraint.begin(context_);
+        for_each([](const auto& constraint, auto& context) { constraint.prescribe(context); });
+        for_each([this](const auto& constraint, auto& context) {
+            step_.contacts.begin_points(context.constraint());
+            constraint.begin(context);
         });
-        context_.contacts().find_shared();
+        step_.contacts.find_shared();
     }
     /// Enforces all constraints, in several rounds if they may oppose one another; returns whether one was violated.
     [[nodiscard]] bool enforce() const noexcept {
         constexpr int max_rounds = 8;
-        const int rounds = context_.contacts().several_on_fixed ? max_rounds : 1;
+        const int rounds = step_.contacts.several_on_fixed ? max_rounds : 1;
         bool changed = false;
         bool again = true;
         for (int i = 0; again && i < rounds; ++i) {
             again = false;
-            for_each([&](const auto& constraint, std::size_t) { again |= constraint.enforce(context_); });
-            limit_motion<Scalar>(context_, context_.contacts().shared.items());
+            for_each([&](const auto& constraint, auto& context) { again |= constraint.enforce(context); });
+            ConstraintContext<Scalar> context(step_);
+            limit_motion<Scalar>(context, step_.contacts.shared.items());
             changed |= again;
         }
         return changed;
@@ -188,43 +189,42 @@ class ConstraintList {
     /// Computes the reactions; returns false if one is not finite. Updates the contact points, stale since `begin`,
     /// from their packs: before `find_violation` and `end`.
     [[nodiscard]] bool react(std::span<Vector3<Scalar>> reactions) const noexcept {
-        auto& contacts = context_.contacts();
-        contacts.packs.unpack(contacts.points.items());
+        step_.contacts.packs.unpack(step_.contacts.points.items());
         bool finite = true;
-        for_each([&](const auto& constraint, std::size_t i) {
-            reactions[i] = constraint.reaction(context_);
-            finite &= is_finite(reactions[i]);
+        for_each([&](const auto& constraint, const auto& context) {
+            auto& reaction = reactions[context.constraint()] = constraint.reaction(context);
+            finite &= is_finite(reaction);
         });
         return finite;
     }
     /// Finds the largest violation, after `react`.
     void find_violation(StepReport<Scalar>& report) const noexcept {
-        for_each([&](const auto&, std::size_t i) {
-            if (context_.contacts().several_on_fixed) sum_support_forces(context_);
-            for (const auto& point : std::as_const(context_).points()) {
+        for_each([&](const auto&, auto& context) {
+            if (step_.contacts.several_on_fixed) sum_support_forces(context);
+            for (const auto& point : std::as_const(context).points()) {
                 if (!point.on_fixed) continue;
-                const Scalar violation = (std::max)(norm(support_displacement(context_, point)),
-                                                    norm(point.force) * support_compliance(context_, point));
+                const Scalar violation = (std::max)(norm(support_displacement(context, point)),
+                                                    norm(point.force) * support_compliance(context, point));
                 if (!(violation > report.violation)) continue;
                 report.violation = violation;
-                report.violated = static_cast<Index>(i);
+                report.violated = static_cast<Index>(context.constraint());
             }
         });
     }
     /// Ends a step that has advanced.
     void end() const noexcept {
-        for_each([this](const auto& constraint, std::size_t) { constraint.end(context_); });
+        for_each([](const auto& constraint, const auto& context) { constraint.end(context); });
     }
 
   private:
     void for_each(auto act) const noexcept {
         for (std::size_t i = 0; i < constraints_.size(); ++i) {
-            context_.select_constraint(i);
-            act(constraints_[i], i);
+            ConstraintContext<Scalar> context(step_, i);
+            act(constraints_[i], context);
         }
     }
 
-    ConstraintContext<Scalar>& context_;
+    ConstrainedStep<Scalar>& step_;
     std::span<const ConstraintRef<Scalar>> constraints_;
 };
 

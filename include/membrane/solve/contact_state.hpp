@@ -46,7 +46,9 @@ struct ContactState {
     /// Number of vertices V.
     [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(owner_.size()); }
 
-    void begin_step() noexcept;    ///< Without points and forces.
+    void begin_step() noexcept;  ///< Without points and forces.
+    /// Begins the points of constraint number `constraint`.
+    void begin_points(std::size_t constraint) noexcept { point_ranges[constraint] = {points.size(), points.size()}; }
     void end_step() noexcept;      ///< Keeps the contact points of this step for the next one.
     void reset_points() noexcept;  ///< Drops the contact points of the last step.
     void reset() noexcept;         ///< As new.
@@ -55,7 +57,7 @@ struct ContactState {
     /// A vertex becomes two: contact points on triangles that get the copy follow.
     void split(const VertexSplit& split) noexcept;
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         if constexpr (Visit::restores) self.reset();

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include <membrane/core/fixed_vector.hpp>
-#include <membrane/core/in_lanes.hpp>
 #include <membrane/core/lane_points.hpp>
+#include <membrane/core/lanes.hpp>
 #include <membrane/model/element.hpp>
 
 /// Elements of vertices that are updated in SIMD lanes.

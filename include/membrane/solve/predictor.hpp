@@ -49,7 +49,7 @@ class Predictor {
     /// The factor is 0 in the next two steps.
     void reset() noexcept { inputs_ = {}; }
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.inputs_);

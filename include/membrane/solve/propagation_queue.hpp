@@ -48,7 +48,7 @@ class VertexColouring {
     /// Removes all groups.
     void clear() noexcept { ends_.clear(); }
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.ends_);
@@ -118,7 +118,7 @@ class PropagationQueue {
         colouring_.clear();
     }
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.reached_, self.layer_ends_, self.colouring_);

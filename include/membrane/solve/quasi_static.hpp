@@ -108,7 +108,7 @@ class QuasiStaticSolver {
     /// Resets the solver to a new one, to the bit: a membrane out of equilibrium does not move until woken. Cost: O(V).
     void reset() noexcept;
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.active_, self.rows_, self.contacts_, self.asleep_below_, self.splits_, self.predictor_,
@@ -327,8 +327,9 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     rows_.force_tolerance = detail::tolerance_of(options_, network, volume, dt);
     // Views: `x` does not change before the end of the step, and `now` shows each update.
     const ConstPointsRef<Scalar> start = x, now = rows_.positions();
-    ConstraintContext<Scalar> context(start, rows_, contacts_, network, splits_);
-    const ConstraintList<Scalar> acting(context, constraints);
+    ConstrainedStep<Scalar> constrained(start, rows_, contacts_, network, splits_);
+    ConstraintContext<Scalar> context(constrained);
+    const ConstraintList<Scalar> acting(constrained, constraints);
     const StepStatus begun = begin_constraints(acting, context, network, volume);
     if (begun != StepStatus::advanced) return refuse_step(begun);
 
@@ -386,13 +387,13 @@ StepStatus QuasiStaticSolver<Scalar, Rule>::begin_constraints(const ConstraintLi
     if (report_.invalid_constraint != no_index) return StepStatus::invalid_input;
     extrapolate<Volume>(acting, context);
     const auto compare_splits = [&](const auto& part, StepStatus missed) {
-        if constexpr (requires { part.splits(); }) context.compare_splits(part.splits(), missed);
+        if constexpr (requires { part.splits(); }) context.step().compare_splits(part.splits(), missed);
     };
     compare_splits(volume, StepStatus::foundation_missed_split);
     compare_splits(network, StepStatus::network_missed_split);
-    if (context.refusal() == StepStatus::advanced) acting.begin();
-    const StepStatus refusal = context.refusal();
-    if (refusal == StepStatus::invalid_input) report_.invalid_constraint = context.invalid_constraint();
+    if (context.step().refusal() == StepStatus::advanced) acting.begin();
+    const StepStatus refusal = context.step().refusal();
+    if (refusal == StepStatus::invalid_input) report_.invalid_constraint = context.step().invalid_constraint();
     return refusal;
 }
 

@@ -10,7 +10,6 @@
 #include <utility>
 
 #include <membrane/core/check.hpp>
-#include <membrane/core/in_lanes.hpp>
 #include <membrane/core/lanes.hpp>
 #include <membrane/model/elastic_network.hpp>
 

@@ -16,14 +16,15 @@ namespace membrane {
 /// Sums the forces at the points on fixed or shared vertices, see `ContactState`.
 template <Real Scalar>
 void sum_support_forces(ConstraintContext<Scalar>& context, std::size_t begun = max_constraints) noexcept {
-    context.contacts().sum_support_forces(context.constraint(), begun);
+    context.step().contacts.sum_support_forces(context.constraint(), begun);
 }
 
 /// The part of the constraint's force on `v` that is opposed, 0 to 1, see `rigid_support.hpp`.
 template <Real Scalar>
 [[nodiscard]] Scalar opposed_part(const ConstraintContext<Scalar>& context, Index v) noexcept {
     if (context.fixed(v)) return 1;
-    const Vector3<Scalar> own = context.contacts().support_force(v), others = context.contacts().opposing_force(v);
+    const Vector3<Scalar> own = context.step().contacts.support_force(v),
+                          others = context.step().contacts.opposing_force(v);
     const Scalar size = norm(own);
     const Scalar opposing = size > 0 ? (std::max)(-dot(own, others) / size, Scalar(0)) : norm(others);
     return opposing > 0 ? opposing / (size + opposing) : Scalar(0);
@@ -33,7 +34,7 @@ template <Real Scalar>
 /// stiffness [m]; zero for other vertices.
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> support_displacement(const ConstraintContext<Scalar>& context, Index v) noexcept {
-    const auto& contacts = context.contacts();
+    const auto& contacts = context.step().contacts;
     const Scalar stiffness = contacts.support_stiffness(v);
     if (!contacts.pressed_supports.contains(v) || !(stiffness > 0)) return Vector3<Scalar>::Zero();
     return opposed_part(context, v) * contacts.support_force(v) / stiffness;
@@ -42,7 +43,7 @@ template <Real Scalar>
 /// Derivative of this displacement by the force [m/N]; zero for other vertices.
 template <Real Scalar>
 [[nodiscard]] Scalar support_compliance(const ConstraintContext<Scalar>& context, Index v) noexcept {
-    const auto& contacts = context.contacts();
+    const auto& contacts = context.step().contacts;
     const Scalar stiffness = contacts.support_stiffness(v);
     const bool held = context.fixed(v) || contacts.pressed_supports.contains(v);
     if (!held || !(stiffness > 0)) return 0;
@@ -54,7 +55,7 @@ template <Real Scalar>
 /// tool or a target since the last one, and the violation.
 template <Real Scalar>
 void allow_motion(ConstraintContext<Scalar>& context, Scalar distance) noexcept {
-    Scalar& largest = context.contacts().largest_motion;
+    Scalar& largest = context.step().contacts.largest_motion;
     largest = (std::max)(largest, distance);
 }
 
@@ -62,7 +63,7 @@ void allow_motion(ConstraintContext<Scalar>& context, Scalar distance) noexcept 
 /// between two tools may turn over in few passes.
 template <Real Scalar>
 void limit_motion(ConstraintContext<Scalar>& context, std::span<const Index> vertices) noexcept {
-    const Scalar largest = context.contacts().largest_motion;
+    const Scalar largest = context.step().contacts.largest_motion;
     for (const Index v : vertices) {
         const Vector3<Scalar> by = context.position(v) - context.start(v);
         const Scalar distance = norm(by);
@@ -93,7 +94,7 @@ template <Real Scalar>
 void add_point_force(ConstraintContext<Scalar>& context, const std::array<Index, 3>& corners,
                      const Vector3<Scalar>& weights, const Vector3<Scalar>& force) noexcept {
     for (std::size_t k = 0; k < 3; ++k) {
-        context.add_constraint_force(corners[k], weights[static_cast<Eigen::Index>(k)] * force);
+        context.step().add_force(corners[k], weights[static_cast<Eigen::Index>(k)] * force);
     }
 }
 
@@ -113,7 +114,7 @@ template <Real Scalar>
 template <Real Scalar>
 [[nodiscard]] bool is_on_fixed(const ConstraintContext<Scalar>& context, const std::array<Index, 3>& corners) noexcept {
     return std::any_of(corners.begin(), corners.end(),
-                       [&](Index v) { return context.fixed(v) || context.contacts().shared.contains(v); });
+                       [&](Index v) { return context.fixed(v) || context.step().contacts.shared.contains(v); });
 }
 
 /// Displaces the free corners as if all corners were free and the point moved by a displacement [m]: a point on fixed
@@ -189,7 +190,7 @@ void change_force(ConstraintContext<Scalar>& context, ContactPoint<Scalar>& poin
     point.force += force;
     for (std::size_t k = 0; k < 3; ++k) {
         const Vector3<Scalar> part = point.weights[static_cast<Eigen::Index>(k)] * force;
-        context.add_constraint_force(point.corners[k], part);
+        context.step().add_force(point.corners[k], part);
         const Vector3<Scalar> by = context.response(point.corners[k], part);
         if (!by.isZero(0)) context.move(point.corners[k], by);
     }

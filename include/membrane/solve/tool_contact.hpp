@@ -46,9 +46,10 @@ struct ToolContact {
     /// As `Constraint` requires.
     [[nodiscard]] bool valid() const noexcept { return is_valid(tool) && is_valid(contact); }
     [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept {
-        if (!contact.touching() || contact.tunnelled) return {};
-        return InputSample<Scalar>{contact.axis_point,
-                                   contact.radius / 2};  // a longer extrapolation might move the surface past the tool
+        if (!contact.touching() || contact.patch.tunnelled) return {};
+        return InputSample<Scalar>{
+            contact.patch.axis_point,
+            contact.patch.radius / 2};  // a longer extrapolation might move the surface past the tool
     }
     void begin(ConstraintContext<Scalar>& context) const noexcept;
     bool enforce(ConstraintContext<Scalar>& context) const noexcept;
@@ -76,22 +77,22 @@ struct ToolContact {
     [[nodiscard]] bool has_new_overlap(const Context& context) const noexcept;
 
     [[nodiscard]] ToolShape<Scalar> shape() const noexcept {
-        return {tool.position, tool.axis, contact.axis_point, contact.radius};
+        return {tool.position, tool.axis, contact.patch.axis_point, contact.patch.radius};
     }
     [[nodiscard]] static auto packs(Context& context) noexcept {
-        return context.contacts().pack_ranges[context.constraint()].of(context.contacts().packs.items());
+        return context.step().contacts.pack_ranges[context.constraint()].of(context.step().contacts.packs.items());
     }
     // The position to which `go_back` moves a vertex: that at the call of `keep`, or at the start of the step.
     static void keep(Context& context, Index v) noexcept {
-        context.load(v);
-        context.contacts().keep(v, context.position(v));
+        context.step().load(v);
+        context.step().contacts.keep(v, context.position(v));
     }
     static void keep_start(Context& context, Index v) noexcept {
-        context.load(v);
-        if (!context.contacts().kept.contains(v)) context.contacts().keep(v, context.start(v));
+        context.step().load(v);
+        if (!context.step().contacts.kept.contains(v)) context.step().contacts.keep(v, context.start(v));
     }
     [[nodiscard]] static Vector3<Scalar> kept(const Context& context, Index v) noexcept {
-        return context.contacts().kept.contains(v) ? context.contacts().kept_at(v) : context.start(v);
+        return context.step().contacts.kept.contains(v) ? context.step().contacts.kept_at(v) : context.start(v);
     }
     static void go_back(Context& context, Scalar part) noexcept;
     [[nodiscard]] static bool on_support(const Context& context) noexcept {
@@ -141,29 +142,31 @@ inline constexpr int max_passes = 8, deep_contact_passes = 16;
 
 template <Real Scalar>
 void ToolContact<Scalar>::begin(Context& context) const noexcept {
-    if (contact.splits != no_index) context.compare_splits(contact.splits, StepStatus::contact_missed_split);
+    if (contact.patch.splits != no_index)
+        context.step().compare_splits(contact.patch.splits, StepStatus::contact_missed_split);
     if (!contact.touching() || !seed(context)) return;
-    if (!contact.has_all_points) {
-        context.refuse_points();
+    if (!contact.patch.has_all_points) {
+        context.step().refuse_points();
         return;
     }
-    allow_motion(context, contact.detection_distance - contact.radius + (std::max)(-contact.gap, Scalar(0)));
+    allow_motion(context,
+                 contact.patch.detection_distance - contact.patch.radius + (std::max)(-contact.gap, Scalar(0)));
     // Until the new points are found, fixed and shared corners are displaced by the forces of the last step.
     sum_support_forces(context, context.constraint());
     const auto out = direction_out_of_support(context);
-    if (contact.tunnelled && !out) carry_with_tool(context);
+    if (contact.patch.tunnelled && !out) carry_with_tool(context);
     list_candidates(context);                                 // after that: `go_back` does not undo it
     const bool held = is_on_fixed(context, contact.corners);  // a tool penetrates these at equilibrium, too
-    if (!contact.tunnelled && !out && !held && contact.gap < -negligible_distance(context, contact.corners[0])) {
+    if (!contact.patch.tunnelled && !out && !held && contact.gap < -negligible_distance(context, contact.corners[0])) {
         clear_contact_point(context);
     }
     out ? touch_support(context, *out) : find_points(context);
-    if (context.refusal() != StepStatus::advanced) return;
+    if (context.step().refusal() != StepStatus::advanced) return;
     pack_points(context);
     for (int pass = 0; pass < detail::max_push_passes; ++pass) {
-        if (!push_out(context.rows(), context.contacts(), shape(), packs(context))) break;
+        if (!push_out(context.step().rows, context.step().contacts, shape(), packs(context))) break;
     }
-    apply_forces(context.rows(), context.contacts(), packs(context));
+    apply_forces(context.step().rows, context.step().contacts, packs(context));
     prevent_tunnelling(context);
 }
 
@@ -178,10 +181,10 @@ bool ToolContact<Scalar>::seed(Context& context) const noexcept {
     const auto all_are_vertices = [&](const auto& items) {
         return std::all_of(items.begin(), items.end(), [&](const auto& item) { return are_vertices(item.corners); });
     };
-    if (!all_are_vertices(contact.triangles) || !all_are_vertices(contact.candidates) ||
-        !all_are_vertices(contact.points))
+    if (!all_are_vertices(contact.patch.triangles) || !all_are_vertices(contact.patch.candidates) ||
+        !all_are_vertices(contact.patch.points))
         return false;
-    for (const auto& listed : contact.triangles) {
+    for (const auto& listed : contact.patch.triangles) {
         for (const Index v : listed.corners) context.seed(v);
     }
     return true;
@@ -190,10 +193,10 @@ bool ToolContact<Scalar>::seed(Context& context) const noexcept {
 // The corners of the candidate triangles, for `prevent_tunnelling`, and the positions to which it moves them back.
 template <Real Scalar>
 void ToolContact<Scalar>::list_candidates(Context& context) const noexcept {
-    for (const auto& candidate : contact.candidates) {
+    for (const auto& candidate : contact.patch.candidates) {
         for (const Index v : candidate.corners) {
-            contact.tunnelled ? keep(context, v) : keep_start(context, v);
-            context.contacts().candidates.insert(v);
+            contact.patch.tunnelled ? keep(context, v) : keep_start(context, v);
+            context.step().contacts.candidates.insert(v);
         }
     }
 }
@@ -206,17 +209,17 @@ void ToolContact<Scalar>::list_candidates(Context& context) const noexcept {
 // there move by w > 1 - s. It does not hit triangles off the path for any such w of their corners.
 template <Real Scalar>
 void ToolContact<Scalar>::carry_with_tool(Context& context) const noexcept {
-    const Vector3<Scalar> path = contact.axis_point - contact.previous_axis_point;
+    const Vector3<Scalar> path = contact.patch.axis_point - contact.patch.previous_axis_point;
     const Scalar length = norm(path);
-    for (const auto& listed : contact.triangles) {
+    for (const auto& listed : contact.patch.triangles) {
         for (const Index v : listed.corners) keep(context, v);
     }
-    for (const auto& listed : contact.triangles) {
+    for (const auto& listed : contact.patch.triangles) {
         const auto& v = listed.corners;
         const auto before = kept_triangle(context, v);
-        const auto hit = first_hit(before, contact.previous_axis_point, contact.axis_point);
+        const auto hit = first_hit(before, contact.patch.previous_axis_point, contact.patch.axis_point);
         if (!hit) continue;
-        const Scalar part = 1 - detail::fraction(hit->fraction * length - contact.radius, length);
+        const Scalar part = 1 - detail::fraction(hit->fraction * length - contact.patch.radius, length);
         for (const Index corner : v) {
             if (context.fixed(corner)) continue;
             const Vector3<Scalar> so_far = context.position(corner) - kept(context, corner);
@@ -231,7 +234,7 @@ void ToolContact<Scalar>::carry_with_tool(Context& context) const noexcept {
 template <Real Scalar>
 void ToolContact<Scalar>::clear_contact_point(Context& context) const noexcept {
     const Vector3<Scalar> now = point_at(surface_triangle(context, contact.corners), contact.barycentric);
-    const Vector3<Scalar> by = contact.axis_point - contact.radius * contact.normal - now;
+    const Vector3<Scalar> by = contact.patch.axis_point - contact.patch.radius * contact.normal - now;
     if (dot(by, contact.normal) < 0) press_in<Scalar>(context, contact.corners, contact.barycentric, by);
 }
 
@@ -239,14 +242,14 @@ void ToolContact<Scalar>::clear_contact_point(Context& context) const noexcept {
 // tunnelled, are found again on the extrapolated surface, where a normal may have the opposite sign.
 template <Real Scalar>
 void ToolContact<Scalar>::find_points(Context& context) const noexcept {
-    const bool as_found = !is_shaft(tool) && !contact.tunnelled;
-    for (const auto& found : contact.points) {
+    const bool as_found = !is_shaft(tool) && !contact.patch.tunnelled;
+    for (const auto& found : contact.patch.points) {
         if (as_found) {
             add_point(context, found);
             continue;
         }
         const auto point = contact_point(found.triangle, found.corners, triangle_of(context, found.corners), tool,
-                                         found.feature, contact.radius);
+                                         found.feature, contact.patch.radius);
         if (point) add_point(context, *point);
     }
 }
@@ -255,18 +258,19 @@ void ToolContact<Scalar>::find_points(Context& context) const noexcept {
 template <Real Scalar>
 void ToolContact<Scalar>::add_point(Context& context, ContactPoint<Scalar> point) const noexcept {
     const auto* before = context.cached_point(point.triangle, point.feature, point.corners[0]);
-    const Scalar distance = point.gap + contact.radius;
-    if (before == nullptr && distance > contact.detection_distance) return;
-    const bool apart = distance > contact.radius / 1000;
-    point.normal = direction(apart ? point.normal : Vector3<Scalar>(contact.previous_axis_point - contact.axis_point),
-                             contact.normal);
+    const Scalar distance = point.gap + contact.patch.radius;
+    if (before == nullptr && distance > contact.patch.detection_distance) return;
+    const bool apart = distance > contact.patch.radius / 1000;
+    point.normal =
+        direction(apart ? point.normal : Vector3<Scalar>(contact.patch.previous_axis_point - contact.patch.axis_point),
+                  contact.normal);
     point.on_fixed = is_on_fixed(context, point.corners);
     // Fixed corners do not follow the tool: when a shaft's axis passes them, it stays on the side of the last step. A
     // triangle that a tool has tunnelled through is between its last and its new position.
     const bool keeps_side = before != nullptr && is_shaft(tool);
-    if (point.on_fixed && (keeps_side || contact.tunnelled)) {
-        const Vector3<Scalar> came = contact.previous_axis_point - contact.axis_point + distance * point.normal -
-                                     support_displacement(context, point);
+    if (point.on_fixed && (keeps_side || contact.patch.tunnelled)) {
+        const Vector3<Scalar> came = contact.patch.previous_axis_point - contact.patch.axis_point +
+                                     distance * point.normal - support_displacement(context, point);
         if (dot(keeps_side ? before->normal : came, point.normal) < 0) point.normal = -point.normal;
     }
     stay_on_side(context, point);
@@ -284,21 +288,21 @@ void ToolContact<Scalar>::stay_on_side(const Context& context, ContactPoint<Scal
     constexpr Scalar tiny = Scalar(5e-4);  // squared radius over area: a radius of less than a 70th of an edge
     if (point.feature < 0 || point.feature > 1) return;
     const Vector3<Scalar> area = area_vector(triangle_of(context, point.corners));
-    const Scalar size = norm(area), square = contact.radius * contact.radius;
+    const Scalar size = norm(area), square = contact.patch.radius * contact.patch.radius;
     if (is_shaft(tool)) {
-        if (contact.closed && square < size) point.side = dot(point.normal, area) < 0 ? Scalar(-1) : Scalar(1);
+        if (contact.patch.closed && square < size) point.side = dot(point.normal, area) < 0 ? Scalar(-1) : Scalar(1);
         return;
     }
     if (!(square < tiny * size)) return;
-    point.by_plane = contact.side * dot(point.normal, area) > 0;
-    if (point.by_plane) point.normal = direction<Scalar>(contact.side * area, point.normal);
+    point.by_plane = contact.patch.side * dot(point.normal, area) > 0;
+    if (point.by_plane) point.normal = direction<Scalar>(contact.patch.side * area, point.normal);
 }
 
 // Applies the points' forces of the last step, from which those of this one go on, and packs the points. First the
 // forces: this marks the corners as forced, on which `add_forces` relies.
 template <Real Scalar>
 void ToolContact<Scalar>::pack_points(Context& context) const noexcept {
-    auto& contacts = context.contacts();
+    auto& contacts = context.step().contacts;
     const auto points = context.points();
     for (const auto& point : points) {
         add_point_force(context, point.corners, point.weights, point.force);
@@ -324,8 +328,8 @@ std::optional<Vector3<Scalar>> ToolContact<Scalar>::direction_out_of_support(con
     const bool turned = dot(pressed, contact.normal) > 0;
     const Vector3<Scalar> out = turned ? Vector3<Scalar>(-contact.normal) : contact.normal;
     // A point tool has a contact radius: within half of it from the surface the axis counts as behind.
-    const Scalar ahead = (contact.radius - tool.radius) / 2;
-    if (!(dot<Scalar>(contact.axis_point - contact.point, out) < ahead)) return std::nullopt;
+    const Scalar ahead = (contact.patch.radius - tool.radius) / 2;
+    if (!(dot<Scalar>(contact.patch.axis_point - contact.point, out) < ahead)) return std::nullopt;
     return out;
 }
 
@@ -342,9 +346,10 @@ void ToolContact<Scalar>::touch_support(Context& context, const Vector3<Scalar>&
 template <Real Scalar>
 bool ToolContact<Scalar>::comes_out(const Triangle<Scalar>& before, const Triangle<Scalar>& now) const noexcept {
     if (!is_shaft(tool)) return false;
-    const Vector3<Scalar> front = contact.side * area_vector(before), front_now = contact.side * area_vector(now);
-    return dot<Scalar>(contact.axis_point - before.a, front) < contact.radius / 1000 * norm(front) &&
-           dot<Scalar>(contact.axis_point - now.a, front_now) > 0;
+    const Vector3<Scalar> front = contact.patch.side * area_vector(before),
+                          front_now = contact.patch.side * area_vector(now);
+    return dot<Scalar>(contact.patch.axis_point - before.a, front) < contact.patch.radius / 1000 * norm(front) &&
+           dot<Scalar>(contact.patch.axis_point - now.a, front_now) > 0;
 }
 
 // Continuous collision detection of the candidate triangles against the tool's axis point. At an impact all free
@@ -353,18 +358,19 @@ bool ToolContact<Scalar>::comes_out(const Triangle<Scalar>& before, const Triang
 template <Real Scalar>
 void ToolContact<Scalar>::prevent_tunnelling(Context& context) const noexcept {
     if (on_support(context)) return;
-    const Scalar farthest = largest_squared_move(context.rows(), context.contacts());
-    if (4 * farthest < contact.radius * contact.radius && contact.gap > -contact.radius / 2) return;
-    const Scalar rounding = detail::rounding_at(contact.axis_point);
+    const Scalar farthest = largest_squared_move(context.step().rows, context.step().contacts);
+    if (4 * farthest < contact.patch.radius * contact.patch.radius && contact.gap > -contact.patch.radius / 2) return;
+    const Scalar rounding = detail::rounding_at(contact.patch.axis_point);
     Scalar first = 1;
-    for (const auto& triangle : contact.candidates) {
+    for (const auto& triangle : contact.patch.candidates) {
         const auto before = kept_triangle(context, triangle.corners);
         const auto now = surface_triangle(context, triangle.corners);
-        const Scalar time = time_of_impact<Scalar>(before, now, contact.axis_point);
+        const Scalar time = time_of_impact<Scalar>(before, now, contact.patch.axis_point);
         if (time == 1 || comes_out(before, now)) continue;
-        const Scalar clearance = std::sqrt(closest_point(before, contact.axis_point).squared_distance);
+        const Scalar clearance = std::sqrt(closest_point(before, contact.patch.axis_point).squared_distance);
         if (clearance <= rounding) continue;  // on the tool's axis: its side is not known
-        const Scalar part = clearance > contact.radius / 2 ? 1 - contact.radius / (4 * clearance) : Scalar(0.1);
+        const Scalar part =
+            clearance > contact.patch.radius / 2 ? 1 - contact.patch.radius / (4 * clearance) : Scalar(0.1);
         first = (std::min)(first, part * time);
     }
     if (first < 1) go_back(context, 1 - first);
@@ -373,7 +379,7 @@ void ToolContact<Scalar>::prevent_tunnelling(Context& context) const noexcept {
 // Moves all free vertices back towards their kept positions, by `part` of the distance, 0 to 1.
 template <Real Scalar>
 void ToolContact<Scalar>::go_back(Context& context, Scalar part) noexcept {
-    for (const Index v : context.rows().loaded.items()) {
+    for (const Index v : context.step().rows.loaded.items()) {
         const Vector3<Scalar> now = context.position(v), before = kept(context, v);
         if (now != before && !context.fixed(v)) context.set_position(v, (1 - part) * now + part * before);
     }
@@ -382,7 +388,7 @@ void ToolContact<Scalar>::go_back(Context& context, Scalar part) noexcept {
 template <Real Scalar>
 bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
     if (!contact.touching()) return false;
-    const bool takes_turns = context.contacts().several_on_fixed;  // then another constraint's pass comes next
+    const bool takes_turns = context.step().contacts.several_on_fixed;  // then another constraint's pass comes next
     if (takes_turns) sum_support_forces(context);
     Scalar first_change = 0;  // largest change of a force in the first pass [N]
     bool released = false;
@@ -391,7 +397,7 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
     const int most = detail::max_contact_passes(points.size(), on_fixed || is_shaft(tool));
     bool deep = false;
     for (int i = 0; i < (takes_turns ? 1 : detail::deep_contact_passes); ++i) {
-        const auto pass = solve_contacts(context.rows(), context.contacts(), shape(), packs(context), i > 0);
+        const auto pass = solve_contacts(context.step().rows, context.step().contacts, shape(), packs(context), i > 0);
         deep = pass.deep && !takes_turns;
         released = released || pass.released;
         if (i == 0) first_change = pass.largest;
@@ -400,13 +406,13 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
         if (!needs_more) break;
     }
     for (int i = 0; deep && i < detail::max_push_passes; ++i)
-        deep = push_out(context.rows(), context.contacts(), shape(), packs(context));
+        deep = push_out(context.step().rows, context.step().contacts, shape(), packs(context));
     if (on_fixed && is_shaft(tool)) {
-        for (const auto& listed : contact.triangles) limit_motion<Scalar>(context, listed.corners);
+        for (const auto& listed : contact.patch.triangles) limit_motion<Scalar>(context, listed.corners);
     }
-    apply_forces(context.rows(), context.contacts(), packs(context));
+    apply_forces(context.step().rows, context.step().contacts, packs(context));
     prevent_tunnelling(context);
-    if (takes_turns) context.contacts().packs.unpack(context.contacts().points.items());
+    if (takes_turns) context.step().contacts.packs.unpack(context.step().contacts.points.items());
     return first_change > 0 || released || has_new_overlap(context);
 }
 
@@ -418,7 +424,7 @@ bool ToolContact<Scalar>::has_new_overlap(const Context& context) const noexcept
     const int features = feature_pairs(tool);
     const auto points = context.points();
     auto next = points.begin();  // in the order of the triangles
-    for (const auto& listed : contact.triangles) {
+    for (const auto& listed : contact.patch.triangles) {
         for (int feature = 0; feature < features; ++feature) {
             if (next != points.end() && next->triangle == listed.triangle && next->feature == feature) {
                 ++next;
@@ -426,7 +432,7 @@ bool ToolContact<Scalar>::has_new_overlap(const Context& context) const noexcept
             }
             const auto nearest = closest_points(surface_triangle(context, listed.corners), tool, feature);
             const Scalar slack = negligible_distance(context, listed.corners[0]);
-            if (nearest && norm(nearest->separation) < contact.radius - slack) return true;
+            if (nearest && norm(nearest->separation) < contact.patch.radius - slack) return true;
         }
     }
     return false;

@@ -136,7 +136,7 @@ class ToolFriction {
         dissipated_ = 0;
     }
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.kept_, self.dissipated_);
@@ -237,7 +237,7 @@ void ToolFriction<Scalar>::begin(Context& context, const Tool<Scalar>& tool) noe
     read_normal_forces(context);
     for (Vertex& v : vertices_.items()) {
         v.force = v.sticking_force = limited(v.force, v);
-        context.add_constraint_force(v.vertex, v.force);
+        context.step().add_force(v.vertex, v.force);
     }
 }
 
@@ -253,7 +253,7 @@ void ToolFriction<Scalar>::hold(Vertex& v, const Vector3<Scalar>& position, cons
 template <Real Scalar>
 void ToolFriction<Scalar>::read_normal_forces(const Context& context) noexcept {
     for (Vertex& v : vertices_.items()) v.normal_force = Vector3<Scalar>::Zero();
-    const auto& contacts = context.contacts();
+    const auto& contacts = context.step().contacts;
     for (const auto& pack : contacts.pack_ranges[context.constraint()].of(contacts.packs.items())) {
         for (std::size_t i = 0; i < pack.size; ++i) {
             const auto& normal = pack.load.normal;
@@ -289,7 +289,7 @@ Scalar ToolFriction<Scalar>::stick(Context& context, const Tool<Scalar>& tool, V
     const Scalar size = norm(change);
     if (!(size > context.force_tolerance()) || !(size * compliance > detail::rounding_at(now))) return 0;
     v.force += change;
-    context.add_constraint_force(v.vertex, change);
+    context.step().add_force(v.vertex, change);
     context.move(v.vertex, context.response(v.vertex, change));
     return size;
 }
@@ -315,7 +315,7 @@ void ToolFriction<Scalar>::limit(Context& context) noexcept {
     for (Vertex& v : vertices_.items()) {
         const Vector3<Scalar> now = limited(v.sticking_force, v);
         if (now == v.force) continue;
-        context.add_constraint_force(v.vertex, now - v.force);
+        context.step().add_force(v.vertex, now - v.force);
         v.force = now;
     }
 }

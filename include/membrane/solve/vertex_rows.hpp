@@ -53,7 +53,7 @@ struct VertexRows {
     void rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept;  ///< Rotates the responses with the body.
     void split(const VertexSplit& split) noexcept;  ///< A vertex becomes two: the copy gets its rows.
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         if constexpr (Visit::restores) self.reset();

@@ -98,7 +98,7 @@ class MovingBody {
     void reshape(const MovedVertex<Scalar>& moved) noexcept;
     ///@}
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         if (self.copies_.capacity() > 0) visit(self.copies_, self.at_rest_, self.normals_at_rest_);

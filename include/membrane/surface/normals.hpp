@@ -70,7 +70,7 @@ class VertexNormals {
     }
     ///@}
 
-    /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the triangles around each vertex.
+    /// Visits what a tear changes, see `replay/snapshot.hpp`: of a mesh with a reserve, each vertex's triangles.
     /// Then update the normals.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {

@@ -54,7 +54,7 @@ class TriangleAdjacency {
     /// A vertex becomes two: triangles that part are neighbours no more. Online. Cost: the triangles around the vertex.
     void split(const VertexSplit& split) noexcept;
 
-    /// Visits what a tear changes, see `core/snapshot.hpp`.
+    /// Visits what a tear changes, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.triangles_of_, self.neighbours_, self.on_border_, self.closed_);

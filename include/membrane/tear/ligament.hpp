@@ -101,7 +101,7 @@ struct LigamentForces {
 // A ligament is a point whose weights are 1 and -1: its position is the separation, its force that on the vertex.
 template <Real Scalar>
 void LigamentForces<Scalar>::begin(ConstraintContext<Scalar>& context) const noexcept {
-    if (splits != no_index) context.compare_splits(splits, StepStatus::solver_missed_split);
+    if (splits != no_index) context.step().compare_splits(splits, StepStatus::solver_missed_split);
     for (const auto& ligament : ligaments) {
         const std::array<Index, 3> corners{ligament.vertex, ligament.copy, ligament.vertex};
         if (!seed_corners(context, corners)) return;

@@ -14,12 +14,12 @@
 #include <membrane/contact/contact.hpp>
 #include <membrane/core/index_set.hpp>
 #include <membrane/core/rigid_frame.hpp>
-#include <membrane/model/tearable_springs.hpp>
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/tear/border_flaw.hpp>
 #include <membrane/tear/crack_driving_force.hpp>
 #include <membrane/tear/ligament.hpp>
 #include <membrane/tear/tear_criterion.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 #include <membrane/tear/torn_surface.hpp>
 
 /// Tears in the membrane: cuts, and their advance under load.
@@ -194,7 +194,7 @@ class Tearing {
     [[nodiscard]] double stored(const ConstPointsRef<Scalar>& x) const noexcept;
     ///@}
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.surface_, self.tips_, self.ligaments_, self.failed_, self.torn_length_, self.used_up_,

@@ -95,7 +95,7 @@ class TornSurface {
     /// must be split next, or it joins two fans of triangles; `back` is for a vertex that is not on a border.
     Index split(PointsRef<Scalar>& x, Index v, Index out, Index back = no_index) noexcept;
 
-    /// Visits what a tear changes, see `core/snapshot.hpp`.
+    /// Visits what a tear changes, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         if constexpr (Visit::restores) self.begin();

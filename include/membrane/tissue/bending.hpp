@@ -10,10 +10,10 @@
 #include <vector>
 
 #include <membrane/core/arctangent.hpp>
-#include <membrane/model/material.hpp>
 #include <membrane/surface/half_edges.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 #include <membrane/tissue/elements.hpp>
+#include <membrane/tissue/material.hpp>
 
 /// Bending stiffness.
 ///

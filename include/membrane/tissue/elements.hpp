@@ -12,7 +12,6 @@
 #include <vector>
 
 #include <membrane/core/compressed_rows.hpp>
-#include <membrane/core/in_lanes.hpp>
 #include <membrane/core/lanes.hpp>
 #include <membrane/model/element.hpp>
 #include <membrane/surface/triangle.hpp>
@@ -221,7 +220,7 @@ class Elements {
     /// See `MassSpringNetwork::force_tolerance`.
     [[nodiscard]] Scalar force_tolerance() const noexcept { return force_tolerance_; }
 
-    /// Visits what a tear changes, see `core/snapshot.hpp`.
+    /// Visits what a tear changes, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.all_, self.at_vertex_);

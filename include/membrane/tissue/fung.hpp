@@ -9,8 +9,8 @@
 
 #include <membrane/core/check.hpp>
 #include <membrane/core/lanes.hpp>
-#include <membrane/model/material.hpp>
 #include <membrane/tissue/incompressible_triangle.hpp>
+#include <membrane/tissue/material.hpp>
 
 /// A sheet of tissue that stiffens with stretch.
 ///

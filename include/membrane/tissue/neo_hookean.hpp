@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/model/material.hpp>
 #include <membrane/tissue/incompressible_triangle.hpp>
+#include <membrane/tissue/material.hpp>
 
 /// A sheet of rubber-like tissue at any strain.
 ///

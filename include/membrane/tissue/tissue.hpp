@@ -95,7 +95,7 @@ class Tissue {
                                                              const ConstPointsRef<Scalar>& x) const noexcept requires
         FollowsSplit<Springs>;
 
-    /// Visits what a tear changes, see `core/snapshot.hpp`.
+    /// Visits what a tear changes, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         if constexpr (FollowsSplit<Springs>) {

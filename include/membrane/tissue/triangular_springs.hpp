@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/model/material.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 #include <membrane/tissue/elements.hpp>
+#include <membrane/tissue/material.hpp>
 
 /// A sheet of any Poisson ratio on any mesh.
 ///

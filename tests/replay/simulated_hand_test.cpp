@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/haptics/simulated_hand.hpp>
+#include <membrane/replay/simulated_hand.hpp>
 
 #include <cmath>
 #include <limits>

@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include <membrane/core/types.hpp>
-#include <membrane/model/material.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/tissue/material.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 /// The number of layers for a membrane on a foundation.
 ///

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/haptics/recording_file.hpp>
+#include <membrane/replay/recording_file.hpp>
 
 #include <algorithm>
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/solve/constraint_term.hpp>
+#include <membrane/accuracy/constraint_term.hpp>
 
 #include <array>
 #include <vector>

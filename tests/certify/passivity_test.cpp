@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/haptics/passivity.hpp>
+#include <membrane/certify/passivity.hpp>
 
 #include <algorithm>
 #include <array>

@@ -13,10 +13,10 @@
 
 #include <membrane/core/field.hpp>
 #include <membrane/model/moving_foundation.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/surface/normals.hpp>
 #include <membrane/surface/vertex_split.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 /// Adhesion of the membrane to the body under it, which peeling overcomes.
 ///
@@ -204,7 +204,7 @@ class CohesiveSprings : public SplitCount {
     void reshape(const MovedVertex<Scalar>& moved) noexcept { anchors_.col(moved.vertex) = moved.rest; }
     ///@}
 
-    /// Visits damage, and what a tear changes, see `core/snapshot.hpp`.
+    /// Visits damage, and what a tear changes, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.anchors_, self.normals_, self.constants_, self.reached_, self.dissipated_, self.splits_);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/core/initial_state.hpp>
+#include <membrane/replay/initial_state.hpp>
 
 #include <membrane/membrane.hpp>
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/recommended_layers.hpp>
+#include <membrane/tissue/recommended_layers.hpp>
 
 #include <array>
 #include <cmath>
 #include <tuple>
 
 #include <membrane/accuracy/equilibrium.hpp>
-#include <membrane/model/foundation_layer.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

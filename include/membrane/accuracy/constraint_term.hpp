@@ -101,10 +101,10 @@ void describe(const ToolContact<Scalar>& press, Terms& terms) {
     contact.corners = press.contact.corners;
     contact.point = press.contact.point.template cast<double>();
     contact.normal = press.contact.normal.template cast<double>();
-    contact.axis_point = press.contact.axis_point.template cast<double>();
+    contact.patch.axis_point = press.contact.patch.axis_point.template cast<double>();
     contact.gap = press.contact.gap;
-    contact.detection_distance = press.contact.detection_distance;
-    contact.radius = press.contact.radius;
+    contact.patch.detection_distance = press.contact.patch.detection_distance;
+    contact.patch.radius = press.contact.patch.radius;
     terms.add(ConstraintTerm::press(tool, contact));
 }
 ///@}

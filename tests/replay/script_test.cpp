@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/haptics/script.hpp>
+#include <membrane/replay/script.hpp>
 
 #include <algorithm>
 #include <cmath>

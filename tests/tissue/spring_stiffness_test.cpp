@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 #include <algorithm>
 #include <array>

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include <membrane/core/snapshot.hpp>
+#include <membrane/replay/snapshot.hpp>
 
 namespace membrane {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/tearable_springs.hpp>
+#include <membrane/tear/tearable_springs.hpp>
 
 #include <algorithm>
 #include <cstddef>
@@ -9,15 +9,15 @@
 #include <type_traits>
 #include <vector>
 
-#include <membrane/model/cohesive_springs.hpp>
-#include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tear/cohesive_springs.hpp>
 #include <membrane/tissue/bending.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
 #include <membrane/tissue/fung.hpp>
 #include <membrane/tissue/neo_hookean.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/foundation_layer.hpp>
+#include <membrane/tissue/foundation_layer.hpp>
 
 #include <cmath>
 #include <limits>
@@ -10,10 +10,10 @@
 #include <vector>
 
 #include <membrane/contact/contact_tracker.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

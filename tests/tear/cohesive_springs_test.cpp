@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/cohesive_springs.hpp>
+#include <membrane/tear/cohesive_springs.hpp>
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 #include <limits>
 #include <vector>
 
-#include <membrane/core/snapshot.hpp>
+#include <membrane/replay/snapshot.hpp>
 #include <membrane/surface/moving_body.hpp>
 #include <membrane/surface/shapes.hpp>
 

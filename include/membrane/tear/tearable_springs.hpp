@@ -10,9 +10,9 @@
 #include <vector>
 
 #include <membrane/model/mass_spring_network.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/surface/half_edges.hpp>
 #include <membrane/surface/vertex_split.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 /// Springs of a membrane that may tear.
 ///
@@ -53,7 +53,7 @@ class TearableSprings : public MassSpringNetwork<Scalar_, Law>, public SplitCoun
     void reshape(const MovedVertex<Scalar>& moved) noexcept;
     ///@}
 
-    /// Visits what a tear changes, see `core/snapshot.hpp`.
+    /// Visits what a tear changes, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         Base::visit_tear(self, visit);

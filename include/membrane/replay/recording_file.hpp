@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/haptics/recording.hpp>
+#include <membrane/replay/recording.hpp>
 
 /// Reading and writing of recordings. Offline.
 ///

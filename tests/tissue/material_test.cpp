@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/material.hpp>
+#include <membrane/tissue/material.hpp>
 
 #include <cmath>
 #include <limits>

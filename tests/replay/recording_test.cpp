@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/haptics/recording.hpp>
+#include <membrane/replay/recording.hpp>
 
 #include <cmath>
 #include <limits>
@@ -7,8 +7,8 @@
 
 #include <membrane/haptics/contact_friction.hpp>
 #include <membrane/haptics/grasp_transition.hpp>
-#include <membrane/haptics/recording_file.hpp>
 #include <membrane/membrane.hpp>
+#include <membrane/replay/recording_file.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"
@@ -210,7 +210,7 @@ TEMPLATE_TEST_CASE("ticks are identical if all of their bits are", "[recording]"
     }
 }
 
-// With all parts of a loop: core/snapshot_test.cpp.
+// With all parts of a loop: replay/snapshot_test.cpp.
 TEST_CASE("a replay starts at the last snapshot at or before a tick, and a full recorder keeps no more",
           "[recording]") {
     Points<double> state = Points<double>::Zero(3, 1);

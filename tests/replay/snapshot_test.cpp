@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/core/snapshot.hpp>
+#include <membrane/replay/snapshot.hpp>
 
 #include <array>
 #include <cstddef>
@@ -10,8 +10,8 @@
 #include <vector>
 
 #include <membrane/haptics/force_limits.hpp>
-#include <membrane/haptics/recording_file.hpp>
 #include <membrane/membrane.hpp>
+#include <membrane/replay/recording_file.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"

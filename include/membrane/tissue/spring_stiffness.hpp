@@ -7,10 +7,10 @@
 #include <string_view>
 #include <vector>
 
-#include <membrane/model/material.hpp>
 #include <membrane/surface/half_edges.hpp>
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/tissue/material.hpp>
 
 /// Constants of springs from those of a material, so that a force does not depend on the mesh, if the mesh resolves the
 /// tool: see `tool_radius`.

@@ -11,10 +11,10 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/core/snapshot.hpp>
 #include <membrane/haptics/device.hpp>
+#include <membrane/replay/snapshot.hpp>
 
-/// Recording of a run, tick by tick, and its replay. Files: `haptics/recording_file.hpp`.
+/// Recording of a run, tick by tick, and its replay. Files: `replay/recording_file.hpp`.
 ///
 ///     membrane::Recorder<double> recorder(60'000, mesh.vertex_count());            // a minute at 1 kHz
 ///     while (device.running()) { ...; device.write(force); recorder.add(tool, force); }
@@ -39,7 +39,7 @@ struct RecordedTick {
 template <Real Scalar>
 [[nodiscard]] bool identical(const RecordedTick<Scalar>& a, const RecordedTick<Scalar>& b) noexcept;
 
-/// The state of a loop before a tick, see `core/snapshot.hpp`.
+/// The state of a loop before a tick, see `replay/snapshot.hpp`.
 struct RecordedSnapshot {
     std::size_t tick = 0;          ///< number of the tick
     std::vector<std::byte> state;  ///< as `save_snapshot` wrote it
