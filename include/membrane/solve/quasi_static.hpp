@@ -325,8 +325,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     rows_.begin_step();
     contacts_.begin_step();
     rows_.force_tolerance = detail::tolerance_of(options_, network, volume, dt);
-    // Views: `x` does not change before the end of the step, and `now` shows each update.
-    const ConstPointsRef<Scalar> start = x, now = rows_.positions();
+    const ConstPointsRef<Scalar> start = x, now = rows_.positions();  // views: `now` shows each update
     ConstrainedStep<Scalar> constrained(start, rows_, contacts_, network, splits_);
     ConstraintContext<Scalar> context(constrained);
     const ConstraintList<Scalar> acting(constrained, constraints);
