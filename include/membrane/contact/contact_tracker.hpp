@@ -442,8 +442,8 @@ template <Real Scalar>
 void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept {
     const auto seen_from = [&](Scalar side) {
         contact = contact_in(surface_, scene.x, f, scene.tool, scene.radius, side);
-        return contact.gap <
-               -scene.radius - detail::rounding_at(contact.patch.axis_point);  // not on the surface itself
+        // On the surface itself it is not behind.
+        return contact.gap < -scene.radius - detail::rounding_at(contact.patch.axis_point);
     };
     const Scalar side = contact.patch.side;
     bool behind = seen_from(side);

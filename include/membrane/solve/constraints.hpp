@@ -175,12 +175,12 @@ class ConstraintList {
     [[nodiscard]] bool enforce() const noexcept {
         constexpr int max_rounds = 8;
         const int rounds = step_.contacts.several_on_fixed ? max_rounds : 1;
+        ConstraintContext<Scalar> context(step_);
         bool changed = false;
         bool again = true;
         for (int i = 0; again && i < rounds; ++i) {
             again = false;
-            for_each([&](const auto& constraint, auto& context) { again |= constraint.enforce(context); });
-            ConstraintContext<Scalar> context(step_);
+            for_each([&](const auto& constraint, auto& of_this) { again |= constraint.enforce(of_this); });
             limit_motion<Scalar>(context, step_.contacts.shared.items());
             changed |= again;
         }

@@ -23,8 +23,8 @@ void sum_support_forces(ConstraintContext<Scalar>& context, std::size_t begun = 
 template <Real Scalar>
 [[nodiscard]] Scalar opposed_part(const ConstraintContext<Scalar>& context, Index v) noexcept {
     if (context.fixed(v)) return 1;
-    const Vector3<Scalar> own = context.step().contacts.support_force(v),
-                          others = context.step().contacts.opposing_force(v);
+    const auto& contacts = context.step().contacts;
+    const Vector3<Scalar> own = contacts.support_force(v), others = contacts.opposing_force(v);
     const Scalar size = norm(own);
     const Scalar opposing = size > 0 ? (std::max)(-dot(own, others) / size, Scalar(0)) : norm(others);
     return opposing > 0 ? opposing / (size + opposing) : Scalar(0);

@@ -47,9 +47,8 @@ struct ToolContact {
     [[nodiscard]] bool valid() const noexcept { return is_valid(tool) && is_valid(contact); }
     [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept {
         if (!contact.touching() || contact.patch.tunnelled) return {};
-        return InputSample<Scalar>{
-            contact.patch.axis_point,
-            contact.patch.radius / 2};  // a longer extrapolation might move the surface past the tool
+        // A longer extrapolation might move the surface past the tool.
+        return InputSample<Scalar>{contact.patch.axis_point, contact.patch.radius / 2};
     }
     void begin(ConstraintContext<Scalar>& context) const noexcept;
     bool enforce(ConstraintContext<Scalar>& context) const noexcept;
@@ -142,11 +141,11 @@ inline constexpr int max_passes = 8, deep_contact_passes = 16;
 
 template <Real Scalar>
 void ToolContact<Scalar>::begin(Context& context) const noexcept {
-    if (contact.patch.splits != no_index)
-        context.step().compare_splits(contact.patch.splits, StepStatus::contact_missed_split);
+    auto& step = context.step();
+    if (contact.patch.splits != no_index) step.compare_splits(contact.patch.splits, StepStatus::contact_missed_split);
     if (!contact.touching() || !seed(context)) return;
     if (!contact.patch.has_all_points) {
-        context.step().refuse_points();
+        step.refuse_points();
         return;
     }
     allow_motion(context,
@@ -161,12 +160,12 @@ void ToolContact<Scalar>::begin(Context& context) const noexcept {
         clear_contact_point(context);
     }
     out ? touch_support(context, *out) : find_points(context);
-    if (context.step().refusal() != StepStatus::advanced) return;
+    if (step.refusal() != StepStatus::advanced) return;
     pack_points(context);
     for (int pass = 0; pass < detail::max_push_passes; ++pass) {
-        if (!push_out(context.step().rows, context.step().contacts, shape(), packs(context))) break;
+        if (!push_out(step.rows, step.contacts, shape(), packs(context))) break;
     }
-    apply_forces(context.step().rows, context.step().contacts, packs(context));
+    apply_forces(step.rows, step.contacts, packs(context));
     prevent_tunnelling(context);
 }
 
@@ -388,7 +387,8 @@ void ToolContact<Scalar>::go_back(Context& context, Scalar part) noexcept {
 template <Real Scalar>
 bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
     if (!contact.touching()) return false;
-    const bool takes_turns = context.step().contacts.several_on_fixed;  // then another constraint's pass comes next
+    auto& step = context.step();
+    const bool takes_turns = step.contacts.several_on_fixed;  // then another constraint's pass comes next
     if (takes_turns) sum_support_forces(context);
     Scalar first_change = 0;  // largest change of a force in the first pass [N]
     bool released = false;
@@ -397,7 +397,7 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
     const int most = detail::max_contact_passes(points.size(), on_fixed || is_shaft(tool));
     bool deep = false;
     for (int i = 0; i < (takes_turns ? 1 : detail::deep_contact_passes); ++i) {
-        const auto pass = solve_contacts(context.step().rows, context.step().contacts, shape(), packs(context), i > 0);
+        const auto pass = solve_contacts(step.rows, step.contacts, shape(), packs(context), i > 0);
         deep = pass.deep && !takes_turns;
         released = released || pass.released;
         if (i == 0) first_change = pass.largest;
@@ -406,13 +406,13 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
         if (!needs_more) break;
     }
     for (int i = 0; deep && i < detail::max_push_passes; ++i)
-        deep = push_out(context.step().rows, context.step().contacts, shape(), packs(context));
+        deep = push_out(step.rows, step.contacts, shape(), packs(context));
     if (on_fixed && is_shaft(tool)) {
         for (const auto& listed : contact.patch.triangles) limit_motion<Scalar>(context, listed.corners);
     }
-    apply_forces(context.step().rows, context.step().contacts, packs(context));
+    apply_forces(step.rows, step.contacts, packs(context));
     prevent_tunnelling(context);
-    if (takes_turns) context.step().contacts.packs.unpack(context.step().contacts.points.items());
+    if (takes_turns) step.contacts.packs.unpack(step.contacts.points.items());
     return first_change > 0 || released || has_new_overlap(context);
 }
 
