@@ -77,6 +77,13 @@ struct SphereScene : Membrane<> {
     explicit SphereScene(const Mesh& on) : Membrane(on, linear_network(on)) {}
 };
 
+/// The vertices carry the contact.
+struct ByVertices : SphereScene {
+    explicit ByVertices(const Mesh& on) : SphereScene(on) {
+        tracker = membrane::ContactTracker<double>(mesh, {.fine_triangles = 0.5});
+    }
+};
+
 /// A second tool presses and slides on the other side of the body.
 struct TwoTools : SphereScene {
     using SphereScene::SphereScene;

@@ -270,6 +270,17 @@ TEST_CASE_METHOD(Touched, "pages: device of one's own") {
     CHECK(driver.force[2] > 0.01);
 }
 
+TEST_CASE_METHOD(Touched, "pages: fine triangles") {
+    // [fine]
+    auto by_vertices = membrane::ContactTracker(mesh, {.fine_triangles = 0.5});
+    // [/fine]
+    tool.radius = 10 * membrane::mean_edge(mesh);
+    tool.position = x.col(0) + (0.99 * tool.radius) * x.col(0).normalized();
+    const auto contact = by_vertices.update(tree, x, tool);
+    REQUIRE(!contact.patch.points.empty());
+    for (const auto& point : contact.patch.points) CHECK(point.feature == membrane::vertex_feature);
+}
+
 TEST_CASE_METHOD(Touched, "pages: facets") {
     Driver driver;
     OwnDevice device(driver);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// Runs 27 scenes in double and in float, and prints a hash of all positions, forces and reports after 1, 10, ... ticks:
+// Runs 28 scenes in double and in float, and prints a hash of all positions, forces and reports after 1, 10, ... ticks:
 //
 //     scenes [--ticks 10000] [--threads 1] [--scene NAME]
 //     scenes [--ticks 1000] [--threads 1] --record FILE
@@ -218,6 +218,7 @@ struct Variant {
     double radius = 0.002, depth = 0.0015;  // of the tool, of a press [m]
     double lift = 0;                        // by which forceps draw up what they hold [m]
     double friction = 0;                    // coefficient
+    double fine_triangles = 0;              // of the tracker [tool radii]
     Vector axis = Vector::Zero();           // of the tool [m]
     bool flat = false, grasps = false, two_tools = false, loads = false;
 };
@@ -234,7 +235,7 @@ class Loop {
           variant_(variant),
           solver_(network, variant.options, variant.rule, std::move(executor)),
           tree_(mesh),
-          tracker_(mesh),
+          tracker_(mesh, {.fine_triangles = variant.fine_triangles}),
           second_tracker_(mesh),
           grasper_(mesh),
           friction_({.coefficient = variant.friction}),
@@ -584,6 +585,7 @@ class Scenes {
         loop("sphere_42", small, network(small), foundation(small), V{.depth = 0.003});
         loop("sphere_162", ball, network(ball), foundation(ball));
         loop("sphere_642", fine, network(fine), foundation(fine));
+        loop("by_vertices", fine, network(fine), foundation(fine), V{.friction = 0.2, .fine_triangles = 0.5});
         loop("ellipsoid", long_ball, network(long_ball), foundation(long_ball), V{.radius = 0.005});
         loop("sheet", flat, network(flat), foundation(flat), V{.flat = true});
         loop("point", ball, network(ball), foundation(ball), V{.radius = 0});

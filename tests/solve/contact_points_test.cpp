@@ -79,7 +79,7 @@ template <class S, class Act>
 void for_each_located(Patch<S>& patch, Act act) {
     for (auto& pack : patch.contacts.packs.items()) {
         pack.load.force = S(1);
-        detail::locate(patch.shape(), detail::corners_of(patch.rows, pack), pack);
+        detail::locate(patch.shape(), detail::corners_of<3>(patch.rows, pack), pack);
         for (std::size_t i = 0; i < pack.size; ++i) {
             const auto& point = patch.points[static_cast<std::size_t>(pack.point[i])];
             act(pack, i, point, closest_points(patch.triangle(point.triangle), patch.tool, point.feature));

@@ -72,6 +72,7 @@ struct ScenePress {
     Tool<double> tool;                  ///< at the end of the increments
     Vector3<double> exit_displacement;  ///< after it the tool just touches the surface from outside [m]
     double detection_distance;          ///< triangles within this distance of the tool are in contact [m]
+    const ContactVertices* vertices;    ///< that carry the contact; null: none do
 };
 
 /// Targets, loads and tools of one increment.
@@ -272,7 +273,8 @@ inline void EquilibriumScene::press(const ConstraintTerm& term) {
         refuse(detail::equilibrium_name, "radius of the contact of constraint ", constraint_,
                " must be finite and positive [m], got ", contact.patch.radius);
     }
-    ScenePress pressing{constraint_, tool, Vector3<double>::Zero(), contact.patch.detection_distance};
+    ScenePress pressing{constraint_, tool, Vector3<double>::Zero(), contact.patch.detection_distance,
+                        contact.patch.vertices};
     pressing.tool.radius = contact.patch.radius;
     if (contact.gap < 0)
         pressing.exit_displacement = contact.point + contact.patch.radius * contact.normal - contact.patch.axis_point;

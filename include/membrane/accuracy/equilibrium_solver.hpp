@@ -68,6 +68,7 @@ class EquilibriumSolver {
     std::vector<Vector3<double>> attachment_forces_;  // force on each attached point [N]
     double stiffness_ = 0;                            // of the stiffest spring [N/m]
     double penalty_ = 0;                              // weight of the penetration [N]
+    std::vector<const ContactVertices*> carriers_;    // of each tool
     Index iterations_ = 0;
 };
 
@@ -99,6 +100,7 @@ EquilibriumSolver<ElasticModel>::EquilibriumSolver(const Points<double>& x, cons
       system_(fixed_),
       attachment_forces_(scene.point_attachments().size(), Vector3<double>::Zero()) {
     here_.elastic.x = x;
+    for (const auto& pressing : scene.tools()) carriers_.push_back(pressing.vertices);
 }
 
 template <class ElasticModel>
@@ -143,7 +145,7 @@ EquilibriumStatus EquilibriumSolver<ElasticModel>::solve_increment() {
 
 template <class ElasticModel>
 auto EquilibriumSolver<ElasticModel>::state_at(const Points<double>& x) -> State {
-    State state{elasticity_.at(x), tool_points(triangles_, x, goals_.tools, edge_ / 2)};
+    State state{elasticity_.at(x), tool_points(triangles_, x, goals_.tools, edge_ / 2, carriers_)};
     std::erase_if(state.contacts, [&](const ToolPoint& point) { return !can_move(point.corners, point.weights); });
     for (auto& point : state.contacts) {
         state.penetration = (std::max)(state.penetration, -point.gap);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <membrane/contact/contact_point.hpp>
+#include <membrane/contact/contact_vertices.hpp>
 #include <membrane/surface/aabb.hpp>
 
 /// The contact points of tools with a whole surface, and the derivatives of their gaps.
@@ -24,7 +25,8 @@ struct ToolPoint : ContactPoint<double> {
     std::size_t tool = 0;   ///< number of the tool
     double multiplier = 0;  ///< force along the normal [N]
 
-    /// The part of the tool: 0 one end of the axis, 1 the other end, 2 the segment between them.
+    /// The part of the tool: 0 one end of the axis, 1 the other end, 2 the segment between them; `vertex_feature` for a
+    /// vertex that carries the contact.
     [[nodiscard]] int part() const noexcept { return (std::min)(feature, 2); }
 
     /// Barycentric weight of corner `k`.
@@ -38,9 +40,11 @@ struct ToolPoint : ContactPoint<double> {
 [[nodiscard]] inline bool is_before(const ToolPoint& a, const ToolPoint& b);
 
 /// The contact points with a gap of at most `far` [m], sorted by `is_before`, without duplicates. A point on the axis
-/// has no normal and is left out. Cost: O(F) for each tool.
+/// has no normal and is left out. `carriers` are for each tool the vertices that carry the contact; null or fewer:
+/// none do. The gap of such a vertex is that beyond its lift. Cost: O(F) for each tool.
 [[nodiscard]] inline std::vector<ToolPoint> tool_points(const Triangles& triangles, const Points<double>& x,
-                                                        std::span<const Tool<double>> tools, double max_distance);
+                                                        std::span<const Tool<double>> tools, double max_distance,
+                                                        std::span<const ContactVertices* const> carriers = {});
 
 /// Second derivative of the gap by the positions of the triangle's corners, x y z each [1/m]. As the corners move, the
 /// closest points slide along edge, face and axis: each sliding direction is eliminated by a Schur complement.
@@ -70,6 +74,14 @@ namespace detail {
     return gap_between(bounds(t), axis) > max_distance;
 }
 
+/// Whether a vertex that carries the contact is nearest to the axis between its ends.
+[[nodiscard]] inline bool is_beside_axis(const ToolPoint& point, const Points<double>& x,
+                                         const Tool<double>& tool) noexcept {
+    if (point.part() != vertex_feature) return false;
+    const double along = dot<double>(membrane::point(x, point.corners[0]) - tool.position, tool.axis);
+    return along > 0 && along < squared_norm(tool.axis);
+}
+
 /// Tool, part, corners with a weight, ascending.
 [[nodiscard]] inline std::array<Index, 5> name_of(const ToolPoint& point) noexcept {
     std::array<Index, 5> name{static_cast<Index>(point.tool), point.part(), no_index, no_index, no_index};
@@ -85,15 +97,29 @@ namespace detail {
 inline bool is_before(const ToolPoint& a, const ToolPoint& b) { return detail::name_of(a) < detail::name_of(b); }
 
 inline std::vector<ToolPoint> tool_points(const Triangles& triangles, const Points<double>& x,
-                                          std::span<const Tool<double>> tools, double max_distance) {
+                                          std::span<const Tool<double>> tools, double max_distance,
+                                          std::span<const ContactVertices* const> carriers) {
     std::vector<ToolPoint> points;
     for (std::size_t i = 0; i < tools.size(); ++i) {
+        const auto& tool = tools[i];
+        const ContactVertices* const vertices = i < carriers.size() ? carriers[i] : nullptr;
+        const double lift = vertices == nullptr ? 0 : vertices->largest_lift(tool.radius);
+        const double within = tool.radius + lift + max_distance;
         for (Index f = 0; f < static_cast<Index>(triangles.cols()); ++f) {
             const std::array<Index, 3> corners{triangles(0, f), triangles(1, f), triangles(2, f)};
             const auto triangle = triangle_at(x, corners);
-            if (detail::is_far(triangle, tools[i], tools[i].radius + max_distance)) continue;
-            for (int feature = 0; feature < feature_pairs(tools[i]); ++feature) {
-                const auto point = contact_point(f, corners, triangle, tools[i], feature, tools[i].radius);
+            if (detail::is_far(triangle, tool, within)) continue;
+            for (const Index v : vertices == nullptr ? std::span<const Index>() : std::span<const Index>(corners)) {
+                if (!vertices->carries(v, tool.radius)) continue;
+                ToolPoint point{vertex_point<double>(v, membrane::point(x, v), f, corners, tool, tool.radius,
+                                                     vertices->lift(v, tool.radius)),
+                                i};
+                point.gap -= point.lift;
+                if (!point.normal.isZero(0) && point.gap <= max_distance) points.push_back(point);
+            }
+            if (vertices != nullptr && vertices->carry(corners, tool.radius)) continue;
+            for (int feature = 0; feature < feature_pairs(tool); ++feature) {
+                const auto point = contact_point(f, corners, triangle, tool, feature, tool.radius);
                 if (point && !point->normal.isZero(0) && point->gap <= max_distance) points.push_back({*point, i});
             }
         }
@@ -108,7 +134,7 @@ inline Eigen::Matrix<double, 9, 9> gap_hessian(const ToolPoint& point, const Poi
                                                const Tool<double>& tool) {
     constexpr int slides = 9;  // first index; at most three: along two sides and the axis
     const Vector3<double>& normal = point.normal;
-    const double distance = point.gap + tool.radius;
+    const double distance = point.gap + tool.radius + point.lift;
     const Eigen::Matrix3d across = (Eigen::Matrix3d::Identity() - normal * normal.transpose()) / distance;
     Eigen::Matrix<double, 3, 12> separation = Eigen::Matrix<double, 3, 12>::Zero();  // its derivatives
     Eigen::Matrix<double, 12, 12> mixed = Eigen::Matrix<double, 12, 12>::Zero();
@@ -130,7 +156,7 @@ inline Eigen::Matrix<double, 9, 9> gap_hessian(const ToolPoint& point, const Poi
         mixed.block<3, 1>(3 * first, slide) = normal;
         mixed.block<3, 1>(3 * k, slide) = -normal;
     }
-    if (point.part() == 2) separation.col(slides + 2) = tool.axis;
+    if (point.part() == 2 || detail::is_beside_axis(point, x, tool)) separation.col(slides + 2) = tool.axis;
 
     Eigen::Matrix<double, 12, 12> second = separation.transpose() * across * separation + mixed + mixed.transpose();
     for (Eigen::Index slide = slides; slide < 12; ++slide) {

@@ -9,6 +9,8 @@
 
 namespace membrane {
 
+class ContactVertices;  // of contact_vertices.hpp
+
 /// Contact in this tick and in the last.
 enum class ContactPhase {
     none,     ///< no contact
@@ -42,6 +44,13 @@ struct ContactPatch {
     /// neighbours.
     std::span<const ContactPoint<Scalar>> points;
     std::span<const ContactTriangle> triangles, candidates;
+    ///@}
+
+    ///@{
+    /// Which vertices carry the contact, valid as long as the tracker; null: none do. And, valid as above, those of
+    /// `triangles` that carry it with their faces then.
+    const ContactVertices* vertices = nullptr;
+    std::span<const ContactTriangle> faces;
     ///@}
 };
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <optional>
+#include <span>
 
 #include <membrane/contact/tool.hpp>
 
@@ -11,6 +13,9 @@
 ///     for (const auto& point : contact.patch.points) std::printf("gap %g m\n", point.gap);   // found by the tracker
 ///     for (const auto& point : solver.contact_points(0)) total += point.force;               // after a step [N]
 namespace membrane {
+
+/// The feature of a vertex that carries the contact: it is corner 0 of the triangle, with all of the weight.
+inline constexpr int vertex_feature = -2;
 
 /// The point of a triangle nearest to one feature of the tool, and the contact force there. The tracker finds it; the
 /// solver updates it and sets its force, as does Newton's method for the exact equilibrium.
@@ -27,6 +32,13 @@ struct ContactPoint {
     bool by_plane = false;  ///< whether the tool is kept on its side of the triangle's plane, not of the triangle only
     Scalar side = 0;        ///< of the triangle, 1 or -1, if the tool is over its interior; 0: as in the last step
     Scalar gap = 0;         ///< signed distance of the tool when the point was found [m]; negative in penetration
+    Scalar lift = 0;        ///< least gap of a vertex that carries the contact [m], see `ContactVertices`
+
+    /// The corners that carry the point: all, or the vertex.
+    [[nodiscard]] std::span<const Index> vertices() const& noexcept {
+        return std::span<const Index>(corners).first(feature == vertex_feature ? 1 : 3);
+    }
+    void vertices() && = delete;
 };
 
 /// The contact point of triangle `f` and a feature of the tool, 0 to `feature_pairs(tool)` - 1, without force. If
@@ -41,6 +53,21 @@ template <Real Scalar>
     ContactPoint<Scalar> point{f, feature, corners, nearest->barycentric};
     point.normal = direction(nearest->separation, Vector3<Scalar>::Zero());
     point.gap = norm(nearest->separation) - radius;
+    return point;
+}
+
+/// The contact point of vertex `v`, at `p` [m], a corner of triangle `f` that carries the contact with this lift [m],
+/// without force. `radius` is the tool's [m].
+template <Real Scalar>
+[[nodiscard]] ContactPoint<Scalar> vertex_point(Index v, const Vector3<Scalar>& p, Index f,
+                                                std::array<Index, 3> corners, const Tool<Scalar>& tool, Scalar radius,
+                                                Scalar lift) noexcept {
+    std::rotate(corners.begin(), std::find(corners.begin(), corners.end(), v), corners.end());
+    ContactPoint<Scalar> point{f, vertex_feature, corners, {1, 0, 0}};
+    const Vector3<Scalar> separation = to_segment(p, tool.position, tool.axis);
+    point.normal = direction_or_zero(separation);
+    point.gap = norm(separation) - radius;
+    point.lift = lift;
     return point;
 }
 

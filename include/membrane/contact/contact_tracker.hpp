@@ -11,6 +11,7 @@
 
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/contact/contact_geometry.hpp>
+#include <membrane/contact/contact_vertices.hpp>
 #include <membrane/contact/local_surface.hpp>
 #include <membrane/contact/tool.hpp>
 #include <membrane/contact/tool_side.hpp>
@@ -38,6 +39,9 @@ struct TrackerOptions {
     double margin = 0.01;
     Index full_query_interval = 128;   ///< ticks in contact between full tree queries, which find further folds
     Index max_contact_points = 16384;  ///< capacity for contact points; determines memory, not time
+    /// The largest circumradius of triangles whose vertices carry the contact, see `ContactVertices`; the others carry
+    /// it with their faces. 0: all do [tool radii].
+    double fine_triangles = 0;
 };
 
 /// Without contact, or if the tool has moved by more than a mean edge in the tick, queries the tree. Otherwise tests
@@ -90,7 +94,7 @@ class ContactTracker : public SplitCount {
     ///@{
     /// A vertex becomes two; a vertex moves at rest. A contact goes on. Online. Cost: the triangles around the vertex.
     void split(const VertexSplit& split) noexcept;
-    void reshape(const MovedVertex<Scalar>& moved) noexcept { origins_.col(moved.vertex) = moved.rest; }
+    void reshape(const MovedVertex<Scalar>& moved) noexcept;
     ///@}
 
     /// Drops contact, tool and side. Later contacts equal those of a new tracker, bit for bit.
@@ -100,7 +104,7 @@ class ContactTracker : public SplitCount {
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.surface_);
-        if (self.surface_.has_reserve()) visit(self.origins_, self.torn_, self.splits_);
+        if (self.surface_.has_reserve()) visit(self.vertices_, self.origins_, self.torn_, self.splits_);
         visit(self.near_, self.nearest_, self.nearest_square_, self.last_, self.last_tool_, self.pose_, self.side_,
               self.origin_triangles_, self.entry_normal_, self.beyond_middle_, self.ticks_, self.full_query_count_,
               self.rebound_ticks_);
@@ -163,6 +167,7 @@ class ContactTracker : public SplitCount {
     void collect_candidates(int rings) noexcept;
     void complete(const Scene& scene, Contact<Scalar>& contact) noexcept;
     void find_points(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    void find_vertices(const Scene& scene, Contact<Scalar>& contact) noexcept;
     template <class List>
     void find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> listed,
                                const List& list) const noexcept;
@@ -191,7 +196,8 @@ class ContactTracker : public SplitCount {
     Points<Scalar> origins_;
     LocalSurface<Scalar> surface_;
     std::optional<LocalSurface<Scalar>> whole_;  // before any tear, if the mesh has a reserve
-    Scalar margin_;                              // [m]
+    ContactVertices vertices_;
+    Scalar margin_;  // [m]
     Index full_query_interval_;
 
     // Triangles within detection distance, those around the active one, and those on the path of a tunnelling tool;
@@ -199,10 +205,11 @@ class ContactTracker : public SplitCount {
     IndexSet near_, near_before_;
     Index nearest_ = no_index;  // of `near_`
     Scalar nearest_square_ = 0;
-    IndexSet queued_;      // for `near_`, in the order of examination
-    IndexSet candidates_;  // `near_` and the rings around it
-    IndexSet expanded_;    // vertices with all their triangles in `candidates_`
-    FixedVector<ContactTriangle> listed_;
+    IndexSet queued_;                              // for `near_`, in the order of examination
+    IndexSet candidates_;                          // `near_` and the rings around it
+    IndexSet expanded_;                            // vertices with all their triangles in `candidates_`
+    IndexSet touched_;                             // vertices with a contact point
+    FixedVector<ContactTriangle> listed_, faces_;  // faces: of `near_`, that carry the contact
     FixedVector<ContactPoint<Scalar>> points_;
     Contact<Scalar> last_;
     std::optional<Tool<Scalar>> last_tool_;
@@ -222,6 +229,7 @@ ContactTracker<Scalar>::ContactTracker(const TriangleMesh<Scalar>& mesh, Tracker
     : origins_(mesh.positions()),
       surface_(mesh),
       whole_(surface_.has_reserve() ? std::optional(surface_) : std::nullopt),
+      vertices_(surface_, ConstPointsRef<Scalar>(origins_), options.fine_triangles),
       margin_(static_cast<Scalar>(options.margin) * surface_.mean_edge()),
       full_query_interval_(options.full_query_interval),
       near_(mesh.triangle_count()),
@@ -229,7 +237,9 @@ ContactTracker<Scalar>::ContactTracker(const TriangleMesh<Scalar>& mesh, Tracker
       queued_(near_),
       candidates_(near_),
       expanded_(mesh.vertex_count()),
+      touched_(options.fine_triangles > 0 ? mesh.vertex_count() : 0),
       listed_(static_cast<std::size_t>(mesh.triangle_count())),
+      faces_(vertices_.any() ? listed_.capacity() : 0),
       points_(static_cast<std::size_t>(std::clamp(options.max_contact_points, Index(0), 5 * mesh.triangle_count()))) {
     if (!is_finite(options.margin) || !(options.margin > 0 && options.margin <= 1)) {
         refuse("ContactTracker", "margin must be above 0 and at most 1 [mean edges], got ", options.margin);
@@ -238,6 +248,9 @@ ContactTracker<Scalar>::ContactTracker(const TriangleMesh<Scalar>& mesh, Tracker
         refuse("ContactTracker", "full_query_interval must be at least 1, got ", options.full_query_interval);
     if (options.max_contact_points < 1)
         refuse("ContactTracker", "max_contact_points must be at least 1, got ", options.max_contact_points);
+    if (!is_finite(options.fine_triangles) || !(options.fine_triangles >= 0 && options.fine_triangles <= 1)) {
+        refuse("ContactTracker", "fine_triangles must be from 0 to 1 [tool radii], got ", options.fine_triangles);
+    }
 }
 
 template <Real Scalar>
@@ -246,7 +259,16 @@ void ContactTracker<Scalar>::split(const VertexSplit& split) noexcept {
     ++splits_;
     surface_.split(split);
     origins_.col(split.copy) = origins_.col(split.vertex);
+    for (const Index v : {split.vertex, split.copy}) vertices_.measure<Scalar>(surface_, origins_, v);
     if (split.takes(last_.triangle)) split.replace_in(last_.corners);
+}
+
+template <Real Scalar>
+void ContactTracker<Scalar>::reshape(const MovedVertex<Scalar>& moved) noexcept {
+    origins_.col(moved.vertex) = moved.rest;
+    for (const Index f : surface_.triangles_of(moved.vertex)) {
+        for (const Index v : surface_.corners(f)) vertices_.measure<Scalar>(surface_, origins_, v);
+    }
 }
 
 template <Real Scalar>
@@ -321,6 +343,8 @@ Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, cons
     last_tool_ = tool;
     last_ = contact;
     last_.patch.triangles = last_.patch.candidates = {};  // valid until the next update only
+    last_.patch.vertices = nullptr;
+    last_.patch.faces = {};
     last_.patch.points = {};
     return contact;
 }
@@ -335,8 +359,9 @@ auto ContactTracker<Scalar>::scene_of(const AabbTree<Scalar>& tree, const ConstP
     // The membrane may follow a withdrawing tool by its last gap.
     const Scalar rebound = (std::max)(last_.gap, Scalar(0));
     const Scalar radius = (std::max)(tool.radius, margin_);
-    return {
-        tree, x, tool, anchors, radius, travel, radius + margin_ + (std::min)(travel + rebound, surface_.mean_edge())};
+    const Scalar lifted = radius + static_cast<Scalar>(vertices_.largest_lift(radius));
+    const Scalar motion = (std::min)(travel + rebound, surface_.mean_edge());
+    return {tree, x, tool, anchors, radius, travel, lifted + margin_ + motion};
 }
 
 // Finds the contact among the triangles of the last tick and their neighbours; false if the tool has left all of them.
@@ -383,13 +408,16 @@ bool ContactTracker<Scalar>::find(const Scene& scene, Contact<Scalar>& contact) 
 // Whether the contact begins or goes on.
 template <Real Scalar>
 bool ContactTracker<Scalar>::contacts(const Scene& scene, Contact<Scalar>& contact) noexcept {
-    if (!last_.touching() && contact.gap > 0) return false;
-    if (contact.gap > 0 && (side_.slid_off() || is_below_border(scene, contact))) return false;
+    const bool by_vertices = vertices_.carry(contact.corners, scene.radius);
+    const Scalar lift = by_vertices ? static_cast<Scalar>(vertices_.lift(contact.corners[0], scene.radius)) : Scalar(0);
+    const Scalar gap = contact.gap - lift;
+    if (!last_.touching() && gap > 0) return false;
+    if (gap > 0 && (side_.slid_off() || is_below_border(scene, contact))) return false;
     const Scalar rebound = measure_depth(scene, contact);
     if (is_hooked(scene, contact)) return false;
     if (!last_.touching()) return true;
     const Scalar slack = margin_ / 1000;
-    return contact.gap <= slack || (contact.depth > 0 && contact.gap <= rebound + scene.travel);
+    return gap <= slack || (contact.depth > 0 && gap <= rebound + scene.travel);
 }
 
 // Whether an end of the tool has passed through the surface since the last tick.
@@ -615,17 +643,44 @@ void ContactTracker<Scalar>::complete(const Scene& scene, Contact<Scalar>& conta
 template <Real Scalar>
 void ContactTracker<Scalar>::find_points(const Scene& scene, Contact<Scalar>& contact) noexcept {
     points_.clear();
+    std::span<const ContactTriangle> faces = contact.patch.triangles;
+    if (!contact.patch.tunnelled && vertices_.any()) {
+        contact.patch.vertices = &vertices_;
+        find_vertices(scene, contact);
+        faces_.clear();
+        for (const auto& listed : faces) {
+            if (!vertices_.carry(listed.corners, scene.radius)) faces_.try_push_back(listed);
+        }
+        contact.patch.faces = faces = faces_.items();
+    }
     const auto list = [&](const ContactPoint<Scalar>& point) {
         if (!contact.patch.tunnelled && point.gap + scene.radius > scene.detection_distance) return;
         if (!points_.try_push_back(point)) contact.patch.has_all_points = false;
     };
     const int features = feature_pairs(scene.tool);
-    if (features == 1) return find_points_of_sphere(scene, contact.patch.triangles, list);
-    for (const auto& [f, corners] : contact.patch.triangles) {
+    if (features == 1) return find_points_of_sphere(scene, faces, list);
+    for (const auto& [f, corners] : faces) {
         const auto triangle = triangle_at(scene.x, corners);
         for (int feature = 0; feature < features; ++feature) {
             const auto point = contact_point(f, corners, triangle, scene.tool, feature, scene.radius);
             if (point) list(*point);
+        }
+    }
+}
+
+// The vertices that carry the contact, of all near triangles: a step moves no other one into the tool. Each is a point
+// of one of its triangles, with all of the weight.
+template <Real Scalar>
+void ContactTracker<Scalar>::find_vertices(const Scene& scene, Contact<Scalar>& contact) noexcept {
+    touched_.clear();
+    for (const auto& listed : contact.patch.triangles) {
+        for (const Index v : listed.corners) {
+            if (!vertices_.carries(v, scene.radius) || !touched_.insert(v)) continue;
+            const Index f = surface_.triangles_of(v).front();
+            const auto lift = static_cast<Scalar>(vertices_.lift(v, scene.radius));
+            const auto point = vertex_point<Scalar>(v, membrane::point(scene.x, v), f, surface_.corners(f), scene.tool,
+                                                    scene.radius, lift);
+            if (!points_.try_push_back(point)) contact.patch.has_all_points = false;
         }
     }
 }

@@ -55,6 +55,13 @@ template <Real Scalar>
     return !tool.axis.isZero(0);
 }
 
+/// The vector from `p` to the nearest point of the segment from `start` to `start` + `axis` [m].
+template <Number N>
+[[nodiscard]] Vector3<N> to_segment(const Vector3<N>& p, const Vector3<N>& start, const Vector3<N>& axis) noexcept {
+    const Vector3<N> to_start = start - p;
+    return to_start + detail::fraction<N>(-dot(to_start, axis), squared_norm(axis)) * axis;
+}
+
 /// The nearest points of the triangle and the tool's axis.
 template <Real Scalar>
 [[nodiscard]] SegmentPair<Scalar> closest_to_axis(const Triangle<Scalar>& triangle, const Tool<Scalar>& tool) noexcept {

@@ -170,6 +170,7 @@ class ConstraintList {
             constraint.begin(context);
         });
         step_.contacts.find_shared();
+        step_.contacts.place_walls(step_.rows);
     }
     /// Enforces all constraints, in several rounds if they may oppose one another; returns whether one was violated.
     [[nodiscard]] bool enforce() const noexcept {

@@ -25,6 +25,7 @@ enum class ContactKind : unsigned char {
     plane,  ///< as `end`, but the normal is the triangle's, even if an edge or a corner is nearest
     edge,   ///< the point of the edge from corner 0 to corner 1 nearest to the axis
     fixed,  ///< weights and normal stay as they are through a step
+    vertex  ///< corner 0; there are no others
 };
 
 /// The feature of a point whose weights and normal stay as they are.
@@ -34,8 +35,14 @@ inline constexpr int fixed_feature = -1;
 template <Real Scalar>
 [[nodiscard]] constexpr ContactKind kind_of(const ContactPoint<Scalar>& point) noexcept {
     if (point.feature == fixed_feature) return ContactKind::fixed;
+    if (point.feature == vertex_feature) return ContactKind::vertex;
     if (point.feature >= 2) return ContactKind::edge;
     return point.by_plane ? ContactKind::plane : ContactKind::end;
+}
+
+/// Number of corners that carry a point.
+[[nodiscard]] constexpr std::size_t corner_count(ContactKind kind) noexcept {
+    return kind == ContactKind::vertex ? 1 : 3;
 }
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
@@ -60,6 +67,8 @@ struct alignas(32) ContactPack {
     Load load;      ///< by the last pass
     Load applied;   ///< included in the rows of forces
     Wide distance;  ///< of the tool's axis from the points, along their normals [m]
+    Wide lift;      ///< of vertices that carry the contact, see `ContactPoint::lift` [m]
+    Wide wall;      ///< of such vertices: how far along the normal they may go [m]
     Wide change;    ///< of the forces in the last pass [N]
 
     Vector3<Wide> free;  ///< 1 for a corner that may move
@@ -73,6 +82,7 @@ struct alignas(32) ContactPack {
     std::size_t size = 0;                            ///< lanes in use
     ContactKind kind = ContactKind::end;             ///< of all its points
     bool on_fixed = false;                           ///< whether a corner of a point is fixed or shared
+    bool has_walls = false;                          ///< whether updates of its vertices find the forces
     bool has_sides = false;                          ///< whether the side of a point is known
     bool acts = true;  ///< whether a point pressed or penetrated in the last pass over all packs
 };
@@ -135,7 +145,7 @@ void ContactPacks<Scalar>::begin_pack(ContactKind kind) noexcept {
     pack.load = {{1, 0, 0}, none, 0, none};  // unused lanes have valid numbers
     pack.applied = {none, none, 0, none};
     pack.free = none;
-    pack.distance = pack.change = pack.side = pack.end = pack.listed = pack.used = Scalar(0);
+    pack.distance = pack.lift = pack.wall = pack.change = pack.side = pack.end = pack.listed = pack.used = Scalar(0);
     for (auto& begins : pack.corner) begins.fill(unused_row_);
     pack.point.fill(no_index);
     pack.turn.fill(0);
@@ -149,15 +159,16 @@ void ContactPacks<Scalar>::add_lane(ContactPack<Scalar>& pack, const ContactPoin
                                     const IsFixed& is_fixed) noexcept {
     const std::size_t i = pack.size++;
     const auto turn = static_cast<unsigned char>(pack.kind == ContactKind::edge ? point.feature - 2 : 0);
-    for (std::size_t k = 0; k < 3; ++k) {
+    for (std::size_t k = 0; k < corner_count(pack.kind); ++k) {
         const std::size_t corner = (k + turn) % 3;
         const auto row = static_cast<Eigen::Index>(k);
         pack.corner[k][i] = begin_of_row(point.corners[corner]);
         pack.load.weights[row].set(i, point.weights[static_cast<Eigen::Index>(corner)]);
-        pack.load.normal[row].set(i, point.normal[row]);
         pack.free[row].set(i, is_fixed(point.corners[corner]) ? Scalar(0) : Scalar(1));
     }
+    for (Eigen::Index k = 0; k < 3; ++k) pack.load.normal[k].set(i, point.normal[k]);
     pack.load.force.set(i, norm(point.force));
+    pack.lift.set(i, point.lift);
     pack.end.set(i, point.feature == 1 ? Scalar(1) : Scalar(0));
     pack.side.set(i, point.side);
     pack.has_sides = pack.has_sides || point.side != 0;
@@ -174,14 +185,15 @@ template <class IsFixed>
 void ContactPacks<Scalar>::append(std::span<const ContactPoint<Scalar>> points, std::size_t first,
                                   IsFixed is_fixed) noexcept {
     constexpr auto none = static_cast<std::size_t>(-1);
-    std::array<std::array<std::size_t, colour_count>, 4> open;  // of each kind and colour, the pack with a free lane
+    std::array<std::array<std::size_t, colour_count>, 5> open;  // of each kind and colour, the pack with a free lane
     for (auto& of_kind : open) of_kind.fill(none);
     const auto colours = [this](Index v) -> std::uint64_t& { return colours_[static_cast<std::size_t>(v)]; };
     const auto add = [&](const ContactPoint<Scalar>& point) {
-        const auto& v = point.corners;
         const ContactKind kind = kind_of(point);
         // If the points of a vertex have all colours, each further point gets a pack of its own.
-        const auto colour = static_cast<std::size_t>(std::countr_one(colours(v[0]) | colours(v[1]) | colours(v[2])));
+        std::uint64_t taken = 0;
+        for (const Index v : point.vertices()) taken |= colours(v);
+        const auto colour = static_cast<std::size_t>(std::countr_one(taken));
         std::size_t at = colour < colour_count ? open[static_cast<std::size_t>(kind)][colour] : none;
         if (at == none || packs_[at].size == lanes) {
             at = packs_.size();
@@ -190,7 +202,7 @@ void ContactPacks<Scalar>::append(std::span<const ContactPoint<Scalar>> points, 
         }
         const auto number = first + static_cast<std::size_t>(&point - points.data());
         add_lane(packs_.items()[at], point, static_cast<Index>(number), is_fixed);
-        for (const Index corner : v) {
+        for (const Index corner : point.vertices()) {
             if (colour < colour_count) colours(corner) |= std::uint64_t{1} << colour;
         }
     };
@@ -204,7 +216,7 @@ void ContactPacks<Scalar>::append(std::span<const ContactPoint<Scalar>> points, 
         if (!presses(point)) add(point);
     }
     for (const auto& point : points) {
-        for (const Index v : point.corners) colours(v) = 0;
+        for (const Index v : point.vertices()) colours(v) = 0;
     }
 }
 

@@ -72,12 +72,15 @@ template <Real Scalar>
 
 namespace detail {
 
-/// Calls `act` with 0, 1 and 2. Unrolled by hand: compilers do not unroll a long loop, and keep its data in memory.
-template <class Act>
+/// Calls `act` with the number of each of the corners, 1 or 3. Unrolled by hand: compilers do not unroll a long loop,
+/// and keep its data in memory.
+template <std::size_t Corners, class Act>
 MEMBRANE_INLINE void each_corner(const Act& act) noexcept {
     act(std::integral_constant<std::size_t, 0>());
-    act(std::integral_constant<std::size_t, 1>());
-    act(std::integral_constant<std::size_t, 2>());
+    if constexpr (Corners == 3) {
+        act(std::integral_constant<std::size_t, 1>());
+        act(std::integral_constant<std::size_t, 2>());
+    }
 }
 
 /// The stiffness [N/m] of each corner by rocking: a triangle that rocks under a tool moves the contact point along
@@ -170,8 +173,18 @@ MEMBRANE_INLINE bool locate_in_faces(const Triangle<Lanes<Scalar>>& triangle, co
     return true;
 }
 
+///@{
 /// Updates weights, normal and distance of a pack to the current positions. Its forces stay, but for points that no
 /// longer exist.
+template <Real Scalar>
+MEMBRANE_INLINE void locate(const ToolShape<Scalar>& tool, const std::array<PaddedLanes<Scalar>, 1>& vertex,
+                            ContactPack<Scalar>& pack) noexcept {
+    using Wide = Lanes<Scalar>;
+    const auto separation =
+        to_segment<Wide>(vertex[0].point, tool.position.template cast<Wide>(), tool.axis.template cast<Wide>());
+    set_normal(pack.listed > 0, separation, separation, pack);
+}
+
 template <Real Scalar>
 MEMBRANE_INLINE void locate(const ToolShape<Scalar>& tool, const std::array<PaddedLanes<Scalar>, 3>& corner,
                             ContactPack<Scalar>& pack) noexcept {
@@ -204,6 +217,7 @@ MEMBRANE_INLINE void locate(const ToolShape<Scalar>& tool, const std::array<Padd
         set_normal(listed & (nearest.fraction > 0) & (nearest.fraction < 1), separation, separation, pack);
     }
 }
+///@}
 
 // The corners of a triangle are updated under the same contact force: rocking together, they are at most twice as stiff
 // as each alone, if no angle is obtuse.
@@ -212,12 +226,12 @@ inline constexpr int corners_at_once = 2;
 /// Adds the change of a pack's forces since they were last applied to the rows of forces, and that of its rocking
 /// stiffness: along the total force on a corner; beside fixed or shared corners in all directions. There a point may
 /// press hard with little weight on its free corners, and other points set the direction of the total force on them.
-template <Real Scalar>
+template <std::size_t Corners, Real Scalar>
 MEMBRANE_NOINLINE MEMBRANE_FLATTEN void add_forces(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
                                                    ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     const auto &load = pack.load, &applied = pack.applied;
-    each_corner([&](std::size_t k) {
+    each_corner<Corners>([&](std::size_t k) {
         const auto i = static_cast<Eigen::Index>(k);
         auto row = gather_padded(rows.force.data(), pack.corner[k].data());
         const Wide now = load.force * load.weights[i], before = applied.force * applied.weights[i];
@@ -246,12 +260,12 @@ struct SupportOfPack {
     Lanes<Scalar> force = 0, stiffness = 0;  // sums over these corners [N], [N/m]
 };
 
-template <Real Scalar>
+template <std::size_t Corners, Real Scalar>
 [[nodiscard]] SupportOfPack<Scalar> support_of(const ContactState<Scalar>& contacts,
                                                const ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     SupportOfPack<Scalar> sum;
-    for (std::size_t k = 0; k < 3; ++k) {
+    for (std::size_t k = 0; k < Corners; ++k) {
         const auto i = static_cast<Eigen::Index>(k);
         const auto support = gather_padded(contacts.support.data(), pack.corner[k].data());
         const auto others = gather_padded(contacts.opposing.data(), pack.corner[k].data());
@@ -272,46 +286,47 @@ template <Real Scalar>
     return sum;
 }
 
-template <Real Scalar>
-[[nodiscard]] MEMBRANE_INLINE std::array<PaddedLanes<Scalar>, 3> corners_of(const VertexRows<Scalar>& rows,
-                                                                            const ContactPack<Scalar>& pack) noexcept {
-    return {gather_padded(rows.position.data(), pack.corner[0].data()),
-            gather_padded(rows.position.data(), pack.corner[1].data()),
-            gather_padded(rows.position.data(), pack.corner[2].data())};
+template <std::size_t Corners, Real Scalar>
+[[nodiscard]] MEMBRANE_INLINE std::array<PaddedLanes<Scalar>, Corners> corners_of(
+    const VertexRows<Scalar>& rows, const ContactPack<Scalar>& pack) noexcept {
+    std::array<PaddedLanes<Scalar>, Corners> corner;
+    each_corner<Corners>(
+        [&](std::size_t k) { corner[k] = gather_padded(rows.position.data(), pack.corner[k].data()); });
+    return corner;
 }
 
 /// The points of a pack at the current positions.
-template <Real Scalar>
+template <std::size_t Corners, Real Scalar>
 struct LocatedPack {
-    std::array<PaddedLanes<Scalar>, 3> corner;
+    std::array<PaddedLanes<Scalar>, Corners> corner;
     SupportOfPack<Scalar> support;
-    Lanes<Scalar> gap;  // to the tool along the normals, with the displacement of fixed corners [m]
+    Lanes<Scalar> gap;  // beyond the lift, along the normals, with the displacement of fixed corners [m]
 };
 
 /// Locates the points of a pack. Fixed corners respond to the forces so far, which are added to the rows.
-template <Real Scalar>
-[[nodiscard]] MEMBRANE_NOINLINE MEMBRANE_FLATTEN LocatedPack<Scalar> located_pack(VertexRows<Scalar>& rows,
-                                                                                  ContactState<Scalar>& contacts,
-                                                                                  const ToolShape<Scalar>& tool,
-                                                                                  ContactPack<Scalar>& pack) noexcept {
-    LocatedPack<Scalar> now{corners_of(rows, pack), {}, 0};
+template <std::size_t Corners, Real Scalar>
+[[nodiscard]] MEMBRANE_NOINLINE MEMBRANE_FLATTEN LocatedPack<Corners, Scalar> located_pack(
+    VertexRows<Scalar>& rows, ContactState<Scalar>& contacts, const ToolShape<Scalar>& tool,
+    ContactPack<Scalar>& pack) noexcept {
+    LocatedPack<Corners, Scalar> now{corners_of<Corners>(rows, pack), {}, 0};
     locate(tool, now.corner, pack);
     if (pack.on_fixed) {
-        add_forces(rows, contacts, pack);
-        now.support = support_of(contacts, pack);
+        add_forces<Corners>(rows, contacts, pack);
+        now.support = support_of<Corners>(contacts, pack);
     }
-    now.gap = pack.distance - now.support.displacement - tool.radius;
+    now.gap = pack.distance - now.support.displacement - (tool.radius + pack.lift);
+    if constexpr (Corners == 1) pack.wall = dot(pack.load.normal, now.corner[0].point) + now.gap;
     return now;
 }
 
 /// A negligible gap: the response to a negligible force, or a few roundings [m].
-template <Real Scalar>
+template <std::size_t Corners, Real Scalar>
 [[nodiscard]] MEMBRANE_INLINE Lanes<Scalar> gap_tolerance(const VertexRows<Scalar>& rows,
-                                                          const LocatedPack<Scalar>& now,
+                                                          const LocatedPack<Corners, Scalar>& now,
                                                           const ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     Wide sum = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
+    for (std::size_t k = 0; k < Corners; ++k) {
         const Wide& weight = pack.load.weights[static_cast<Eigen::Index>(k)];
         const Wide& compliance = now.corner[k].extra;
         sum += weight * weight * compliance;
@@ -322,24 +337,24 @@ template <Real Scalar>
 }
 
 /// Response of the corners of a pack to a unit force along the normal, and the internal force and stiffness there.
-template <Real Scalar>
+template <std::size_t Corners, Real Scalar>
 struct PackResponse {
-    std::array<Vector3<Lanes<Scalar>>, 3> of_corner;  // to its part of the force [m/N]
-    Lanes<Scalar> compliance;                         // of the points [m/N]
-    Lanes<Scalar> balanced_force;                     // largest that internal and external forces there balance [N]
-    Lanes<Scalar> internal_stiffness;                 // sum over the corners [N/m]
+    std::array<Vector3<Lanes<Scalar>>, Corners> of_corner;  // to its part of the force [m/N]
+    Lanes<Scalar> compliance;                               // of the points [m/N]
+    Lanes<Scalar> balanced_force;      // largest that internal and external forces there balance [N]
+    Lanes<Scalar> internal_stiffness;  // sum over the corners [N/m]
 };
 
-template <Real Scalar>
-[[nodiscard]] MEMBRANE_INLINE PackResponse<Scalar> response_of(const VertexRows<Scalar>& rows,
-                                                               const SupportOfPack<Scalar>& support,
-                                                               const ContactPack<Scalar>& pack) noexcept {
+template <std::size_t Corners, Real Scalar>
+[[nodiscard]] MEMBRANE_INLINE PackResponse<Corners, Scalar> response_of(const VertexRows<Scalar>& rows,
+                                                                        const SupportOfPack<Scalar>& support,
+                                                                        const ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
-    PackResponse<Scalar> response;
+    PackResponse<Corners, Scalar> response;
     response.compliance = support.compliance;
     response.balanced_force = support.force;
     response.internal_stiffness = support.stiffness;
-    each_corner([&](std::size_t k) {
+    each_corner<Corners>([&](std::size_t k) {
         const auto corner = rows.responses(pack.corner[k]);
         const Wide& weight = pack.load.weights[static_cast<Eigen::Index>(k)];
         response.of_corner[k] = weight * (corner.compliance * pack.load.normal);
@@ -357,9 +372,9 @@ template <Real Scalar>
 
 /// Changes the force of each acting point by its gap over its compliance, never below zero, and moves the corners by
 /// their response. Returns the absolute change [N].
-template <Real Scalar>
+template <std::size_t Corners, Real Scalar>
 MEMBRANE_INLINE Lanes<Scalar> solve(VertexRows<Scalar>& rows, const typename Lanes<Scalar>::Mask& acts,
-                                    const PackResponse<Scalar>& response, LocatedPack<Scalar>& now,
+                                    const PackResponse<Corners, Scalar>& response, LocatedPack<Corners, Scalar>& now,
                                     ContactPack<Scalar>& pack, ContactPass<Scalar>& pass) noexcept {
     using Wide = Lanes<Scalar>;
     const auto moves = acts & (response.compliance > 0);
@@ -381,11 +396,76 @@ MEMBRANE_INLINE Lanes<Scalar> solve(VertexRows<Scalar>& rows, const typename Lan
     pack.load.force += change;
     // So large a change has no linear response: the next updates of the corners follow a release.
     const Wide linear = select<Wide>(too_hard, 0, change);
-    each_corner([&](std::size_t k) {
+    each_corner<Corners>([&](std::size_t k) {
         now.corner[k].point -= linear * response.of_corner[k];
         scatter_padded(now.corner[k], rows.position.data(), pack.corner[k].data());
     });
     return abs(change);
+}
+
+/// `push_out` for one pack.
+template <std::size_t Corners, Real Scalar>
+[[nodiscard]] bool push_out(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts, const ToolShape<Scalar>& tool,
+                            ContactPack<Scalar>& pack) noexcept {
+    using Wide = Lanes<Scalar>;
+    auto now = located_pack<Corners>(rows, contacts, tool, pack);
+    const auto inside = (pack.used > 0) & (-now.gap > gap_tolerance(rows, now, pack));
+    if (!any(inside) || (Corners == 1 && !pack.on_fixed)) return false;  // the updates move vertices out
+    const Wide part = select<Wide>(inside, now.gap / squared_norm(pack.load.weights), 0);
+    each_corner<Corners>([&](std::size_t k) {
+        const auto i = static_cast<Eigen::Index>(k);
+        now.corner[k].point += (part * pack.load.weights[i] * pack.free[i]) * pack.load.normal;
+        scatter_padded(now.corner[k], rows.position.data(), pack.corner[k].data());
+    });
+    return true;
+}
+
+/// Takes the multipliers of the vertices with walls, and places the walls at the current positions. The absolute
+/// changes of their forces since the last call, those that close a gap included [N].
+template <Real Scalar>
+[[nodiscard]] MEMBRANE_NOINLINE MEMBRANE_FLATTEN Lanes<Scalar> follow_vertices(VertexRows<Scalar>& rows,
+                                                                               ContactState<Scalar>& contacts,
+                                                                               const ToolShape<Scalar>& tool,
+                                                                               ContactPack<Scalar>& pack) noexcept {
+    using Wide = Lanes<Scalar>;
+    const Wide now = Wide::of([&](std::size_t i) {
+        return i < pack.size ? rows.multiplier[static_cast<std::size_t>(row_at(pack.corner[0][i]))] : Scalar(0);
+    });
+    const Wide change = abs(now - pack.load.force);
+    pack.load.force = pack.applied.force = now;  // the updates have changed the rows of forces
+    auto located = located_pack<1>(rows, contacts, tool, pack);
+    add_forces<1>(rows, contacts, pack);
+    place_wall(rows, pack);
+    const Wide& compliance = located.corner[0].extra;
+    const Wide error = larger<Wide>(change, -located.gap / select<Wide>(compliance > 0, compliance, 1));
+    return select<Wide>((pack.used > 0) & (error * compliance > gap_tolerance(rows, located, pack)), error, 0);
+}
+
+/// `solve_contacts` for one pack: the absolute changes of its forces [N].
+template <std::size_t Corners, Real Scalar>
+[[nodiscard]] MEMBRANE_INLINE Lanes<Scalar> solve_pack(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
+                                                       const ToolShape<Scalar>& tool, ContactPack<Scalar>& pack,
+                                                       ContactPass<Scalar>& pass) noexcept {
+    using Wide = Lanes<Scalar>;
+    if constexpr (Corners == 1) {
+        if (pack.has_walls) {
+            const Wide change = follow_vertices(rows, contacts, tool, pack);
+            if (pack.has_walls) return change;
+        }
+    }
+    auto now = located_pack<Corners>(rows, contacts, tool, pack);
+    const auto acts = (pack.used > 0) & ((pack.load.force > 0) | (now.gap < 0));
+    pack.acts = any(acts);
+    if (!pack.acts) return 0;
+    if constexpr (Corners == 3) {
+        const auto allowed = static_cast<Scalar>(deep_overlap * deep_overlap);
+        const Wide edge_square = squared_norm<Wide>(now.corner[1].point - now.corner[0].point);
+        pass.deep = pass.deep || any((pack.used > 0) & (now.gap < 0) & (now.gap * now.gap > allowed * edge_square));
+    }
+    const auto response = response_of<Corners>(rows, now.support, pack);
+    const Wide change = solve(rows, acts, response, now, pack, pass);
+    if (pack.on_fixed) add_forces<Corners>(rows, contacts, pack);
+    return change;
 }
 
 template <Real Scalar>
@@ -400,19 +480,10 @@ template <Real Scalar>
 template <Real Scalar>
 bool push_out(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts, const ToolShape<Scalar>& tool,
               std::span<ContactPack<Scalar>> packs) noexcept {
-    using Wide = Lanes<Scalar>;
     bool moved = false;
     for (auto& pack : packs) {
-        auto now = detail::located_pack(rows, contacts, tool, pack);
-        const auto inside = (pack.used > 0) & (-now.gap > detail::gap_tolerance(rows, now, pack));
-        if (!any(inside)) continue;
-        moved = true;
-        const Wide part = select<Wide>(inside, now.gap / squared_norm(pack.load.weights), 0);
-        detail::each_corner([&](std::size_t k) {
-            const auto i = static_cast<Eigen::Index>(k);
-            now.corner[k].point += (part * pack.load.weights[i] * pack.free[i]) * pack.load.normal;
-            scatter_padded(now.corner[k], rows.position.data(), pack.corner[k].data());
-        });
+        moved |= pack.kind == ContactKind::vertex ? detail::push_out<1>(rows, contacts, tool, pack)
+                                                  : detail::push_out<3>(rows, contacts, tool, pack);
     }
     return moved;
 }
@@ -421,21 +492,13 @@ template <Real Scalar>
 MEMBRANE_FLATTEN ContactPass<Scalar> solve_contacts(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
                                                     const ToolShape<Scalar>& tool, std::span<ContactPack<Scalar>> packs,
                                                     bool again) noexcept {
-    using Wide = Lanes<Scalar>;
     ContactPass<Scalar> pass;
-    Wide largest = 0;
+    Lanes<Scalar> largest = 0;
     for (auto& pack : packs) {
         if (again && !pack.acts) continue;
-        auto now = detail::located_pack(rows, contacts, tool, pack);
-        const auto acts = (pack.used > 0) & ((pack.load.force > 0) | (now.gap < 0));
-        pack.acts = any(acts);
-        if (!pack.acts) continue;
-        const auto allowed = static_cast<Scalar>(deep_overlap * deep_overlap);
-        const Wide edge_square = squared_norm<Wide>(now.corner[1].point - now.corner[0].point);
-        pass.deep = pass.deep || any((pack.used > 0) & (now.gap < 0) & (now.gap * now.gap > allowed * edge_square));
-        const auto response = detail::response_of(rows, now.support, pack);
-        largest = larger<Wide>(largest, detail::solve(rows, acts, response, now, pack, pass));
-        if (pack.on_fixed) detail::add_forces(rows, contacts, pack);
+        largest = larger<Lanes<Scalar>>(largest, pack.kind == ContactKind::vertex
+                                                     ? detail::solve_pack<1>(rows, contacts, tool, pack, pass)
+                                                     : detail::solve_pack<3>(rows, contacts, tool, pack, pass));
     }
     pass.largest = detail::largest_of(largest);
     return pass;
@@ -446,16 +509,15 @@ MEMBRANE_FLATTEN void apply_forces(VertexRows<Scalar>& rows, ContactState<Scalar
                                    std::span<ContactPack<Scalar>> packs) noexcept {
     for (auto& pack : packs) {
         auto& load = pack.load;
-        if (any(load.force > 0)) {
-            const auto corner = detail::corners_of(rows, pack);
-            load.stiffness = detail::rocking_stiffness<Lanes<Scalar>>(
-                {corner[0].point, corner[1].point, corner[2].point}, load.weights, load.force * abs(pack.distance));
-        } else if (any(pack.applied.force > 0)) {
-            load.stiffness = Vector3<Lanes<Scalar>>::Zero();
-        } else {
+        if (!any((load.force > 0) | (pack.applied.force > 0))) continue;
+        if (pack.kind == ContactKind::vertex) {
+            detail::add_forces<1>(rows, contacts, pack);
             continue;
         }
-        detail::add_forces(rows, contacts, pack);
+        const auto corner = detail::corners_of<3>(rows, pack);
+        load.stiffness = detail::rocking_stiffness<Lanes<Scalar>>({corner[0].point, corner[1].point, corner[2].point},
+                                                                  load.weights, load.force * abs(pack.distance));
+        detail::add_forces<3>(rows, contacts, pack);
     }
 }
 

@@ -106,6 +106,10 @@ struct ContactState {
     /// Finds the vertices shared by points of several constraints. Cost: linear in the points.
     void find_shared() noexcept;
 
+    /// Places walls for the vertices that carry a contact, where no other constraint acts: from then on the vertex
+    /// updates find their multipliers. After `find_shared`. Cost: linear in the packs.
+    void place_walls(VertexRows<Scalar>& rows) noexcept;
+
     // One row more than vertices, for unused lanes. Three numbers, and the fourth:
     Rows support;        ///< of fixed and shared vertices: `support_force`, `support_stiffness`
     Rows opposing;       ///< of fixed and shared vertices: `opposing_force`
@@ -186,7 +190,7 @@ void ContactState<Scalar>::find_shared() noexcept {
     for (std::size_t c = 0; c < max_constraints; ++c) {
         const auto number = static_cast<unsigned char>(c + 1);
         for (const auto& point : point_ranges[c].of(points.items())) {
-            for (const Index v : point.corners) {
+            for (const Index v : point.vertices()) {
                 if (!is_vertex(v)) continue;
                 const auto before = std::exchange(owner_of(v), number);
                 if (before != 0 && before != number) shared.insert(v);
@@ -197,7 +201,7 @@ void ContactState<Scalar>::find_shared() noexcept {
     for (const auto& range : point_ranges) {
         bool on_fixed = false;
         for (auto& point : range.of(points.items())) {
-            for (const Index v : point.corners) {
+            for (const Index v : point.vertices()) {
                 if (!is_vertex(v)) continue;
                 owner_of(v) = 0;
                 point.on_fixed = point.on_fixed || shared.contains(v);
@@ -210,6 +214,25 @@ void ContactState<Scalar>::find_shared() noexcept {
     packs.set_on_fixed(points.items());
 }
 
+/// Writes the walls of a pack as last located; none if a vertex is fixed or shared.
+template <Real Scalar>
+MEMBRANE_INLINE void place_wall(VertexRows<Scalar>& rows, ContactPack<Scalar>& pack) noexcept {
+    pack.has_walls = !pack.on_fixed;
+    rows.has_walls = rows.has_walls || pack.has_walls;
+    const Lanes<Scalar> exists = pack.has_walls ? pack.used : Lanes<Scalar>(0);
+    scatter_padded<Scalar>({exists * pack.load.normal, pack.wall}, rows.wall.data(), pack.corner[0].data());
+    for (std::size_t i = 0; i < pack.size; ++i) {
+        rows.multiplier[static_cast<std::size_t>(row_at(pack.corner[0][i]))] = pack.load.force[i];
+    }
+}
+
+template <Real Scalar>
+void ContactState<Scalar>::place_walls(VertexRows<Scalar>& rows) noexcept {
+    for (auto& pack : packs.items()) {
+        if (pack.kind == ContactKind::vertex && !pack.on_fixed) place_wall(rows, pack);
+    }
+}
+
 template <Real Scalar>
 void ContactState<Scalar>::sum_support_forces(std::size_t constraint, std::size_t begun) noexcept {
     clear_supports();
@@ -218,7 +241,7 @@ void ContactState<Scalar>::sum_support_forces(std::size_t constraint, std::size_
             c < begun ? point_ranges[c].of(points.items()) : previous_ranges[c].of(previous_points.items());
         auto& rows = c == constraint ? support : opposing;
         for (const auto& point : of_constraint) {
-            for (std::size_t k = 0; k < 3 && point.on_fixed; ++k) {
+            for (std::size_t k = 0; k < point.vertices().size() && point.on_fixed; ++k) {
                 const Index v = point.corners[k];
                 pressed_supports.insert(v);
                 VertexRows<Scalar>::add(rows, v, point.weights[static_cast<Eigen::Index>(k)] * point.force);

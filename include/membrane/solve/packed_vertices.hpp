@@ -194,7 +194,10 @@ class PackedVertices {
         Vector3<Wide> here;
         VertexState<Wide> vertex;
         VertexForce<Wide> others;
+        bool has_walls = false;
     };
+    // Of vertices with a wall: of 1 to 1.7 it leaves the least error of the force after few updates.
+    static constexpr Scalar over_relaxation = Scalar(1.4);
     template <class Rule, class Scene>
     [[nodiscard]] PackState evaluate(std::size_t p, const Scene& scene, Constrained constrained) const noexcept;
     template <class Scene, class Rule>
@@ -210,7 +213,7 @@ class PackedVertices {
         outcomes_[p + 1] = move(p + 1, next, scene, rule);
     }
     template <class Scene, class Rule>
-    Outcome move(std::size_t p, const PackState& at, const Scene& scene, const Rule& rule) noexcept;
+    Outcome move(std::size_t p, PackState at, const Scene& scene, const Rule& rule) noexcept;
     template <class Rule, class Scene>
     [[nodiscard]] VertexState<Wide> spring_state(std::size_t p, const Vector3<Wide>& here,
                                                  const Scene& scene) const noexcept;
@@ -229,6 +232,8 @@ class PackedVertices {
         return Wide::of(
             [&](std::size_t i) { return rows.added_stiffness[static_cast<std::size_t>(row_at(packs_[p].own[i]))]; });
     }
+    [[nodiscard]] Vector3<Wide> stop_at_walls(std::size_t p, PackState& at, const Symmetric3<Wide>& block,
+                                              VertexRows<Scalar>& rows) const noexcept;
     void keep_response(std::size_t p, const PackState& at, const Symmetric3<Wide>& block,
                        VertexRows<Scalar>& rows) const noexcept;
 
@@ -450,6 +455,34 @@ MEMBRANE_INLINE void PackedVertices<Scalar>::keep_response(std::size_t p, const 
                                        kept(internal_stiffness)});
 }
 
+// Changes the multipliers of vertices with a wall so that their displacements, `block` times the force, end in front of
+// it, or on it: Newton's step of the vertex under its constraint, over-relaxed. Returns the displacements.
+template <Real Scalar>
+MEMBRANE_INLINE auto PackedVertices<Scalar>::stop_at_walls(std::size_t p, PackState& at, const Symmetric3<Wide>& block,
+                                                           VertexRows<Scalar>& rows) const noexcept -> Vector3<Wide> {
+    const auto& own = packs_[p].own;
+    const auto wall = gather_padded(rows.wall.data(), own.data());
+    const Vector3<Wide>& normal = wall.point;
+    const Wide compliance = dot<Wide>(normal, block * normal);
+    const auto held = (compliance > 0) & (terms_[p].free != 0);
+    const Wide factor = select<Wide>(held, at.vertex.over_relaxation, 1);
+    const Wide before =
+        Wide::of([&](std::size_t i) { return rows.multiplier[static_cast<std::size_t>(row_at(own[i]))]; });
+    const Wide beyond = dot<Wide>(normal, at.here + factor * (block * at.vertex.force)) - wall.extra;
+    const Wide needed = before + beyond / select<Wide>(held, factor * compliance, 1);
+    const Wide multiplier = select<Wide>(held, larger<Wide>(needed, 0), before);
+    const Vector3<Wide> change = (before - multiplier) * normal;
+    at.vertex.force += change;
+    at.others.force += change;
+    auto of_constraints = gather_padded(rows.force.data(), own.data());
+    of_constraints.point += change;
+    scatter_padded(of_constraints, rows.force.data(), own.data());
+    for (std::size_t i = 0; i < packs_[p].size; ++i) {
+        rows.multiplier[static_cast<std::size_t>(row_at(own[i]))] = multiplier[i];
+    }
+    return factor * (block * at.vertex.force);
+}
+
 // Evaluates the forces on the vertices of a pack.
 template <Real Scalar>
 template <class Rule, class Scene>
@@ -476,6 +509,8 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene
         if (constrained == Constrained::in_contact) {
             at.vertex.contact_stiffness = contact_stiffness;
             at.vertex.contact_normal = direction_or_zero<Wide>(of_constraints.point);
+            at.has_walls = rows.has_walls && any(squared_norm(gather(rows.wall.data(), own.data())) > 0);
+            if (at.has_walls && is_descent_rule<Rule>) at.vertex.over_relaxation = over_relaxation;
         }
     }
     at.vertex.force += at.others.force;
@@ -488,13 +523,14 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene
 
 template <Real Scalar>
 template <class Scene, class Rule>
-MEMBRANE_INLINE auto PackedVertices<Scalar>::move(std::size_t p, const PackState& at, const Scene& scene,
+MEMBRANE_INLINE auto PackedVertices<Scalar>::move(std::size_t p, PackState at, const Scene& scene,
                                                   const Rule& rule) noexcept -> Outcome {
     VertexRows<Scalar>& rows = scene.rows;
     const auto& own = packs_[p].own;
     const auto may_move = terms_[p].free != 0;
     const bool in_queue = p < assigned_.packs;
-    const auto move = move_of(rule, at.vertex, in_queue ? rows.force_tolerance : rows.outside_tolerance());
+    const Scalar tolerance = in_queue ? rows.force_tolerance : rows.outside_tolerance();
+    auto move = move_of(rule, at.vertex, tolerance);
     if constexpr (moves_along_force<Rule, Scalar> && !is_descent_rule<Rule>) {
         if (any(move.may_overshoot & may_move)) {
             const Wide suspect = select<Wide>(move.may_overshoot & may_move, 1, 0);
@@ -503,7 +539,14 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::move(std::size_t p, const PackState
             }
         }
     }
-    if (at.vertex.constrained) keep_response(p, at, as_block<Wide>(move.compliance), rows);
+    if (at.vertex.constrained) {
+        const auto block = as_block<Wide>(move.compliance);
+        keep_response(p, at, block, rows);
+        if (at.has_walls) {
+            move.displacement = stop_at_walls(p, at, block, rows);
+            move.moves = norm(at.vertex.force) > tolerance;
+        }
+    }
     const auto moves = move.moves & may_move;
     Vector3<Wide> displacement = move.displacement;
     if constexpr (needs_line_search<Rule, NetworkOf<Scene>>) {

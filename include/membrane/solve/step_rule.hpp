@@ -36,7 +36,8 @@ struct VertexState : EnergyMajoriser<Scalar> {
     Vector3<Scalar> contact_normal = Vector3<Scalar>::Zero();  ///< along the forces of constraints; zero without
     Scalar mass = 0;                                           ///< [kg], zero where the network has none
     Each<Scalar> dt = 0;                                       ///< [s]
-    bool constrained = false;  ///< of layer 0: constraints set their forces by its response
+    Each<Scalar> over_relaxation = 1;  ///< by which the solver multiplies the displacement: at most 1.4 [1]
+    bool constrained = false;          ///< of layer 0: constraints set their forces by its response
 };
 
 /// A step rule: the compliance of a vertex [m/N], a number, or a `Symmetric3` for a rule whose displacements are not
@@ -90,6 +91,7 @@ template <Number N, class Rule>
             one.contact_normal = lane_of<Vector3<Scalar>>(vertex.contact_normal, i);
             one.mass = vertex.mass[i];
             one.dt = vertex.dt;
+            one.over_relaxation = vertex.over_relaxation;
             one.constrained = vertex.constrained;
             if constexpr (std::same_as<One, Scalar>) {
                 all.set(i, rule.compliance(one));
@@ -203,7 +205,8 @@ MEMBRANE_INLINE Symmetric3<Scalar> BlockStep::compliance(const VertexState<Scala
     const auto resists = all_round > 0;
     const Scalar per_stiffness = 1 / select(resists, all_round, Scalar(1));
     const Each<Scalar> relaxation = detail::relaxation(omega, vertex);
-    const Scalar unreduced = per_stiffness * ((std::max)(relaxation, Each<Scalar>(1)) * norm(vertex.force));
+    const Each<Scalar> longest = vertex.over_relaxation * (std::max)(relaxation, Each<Scalar>(1));
+    const Scalar unreduced = per_stiffness * (longest * norm(vertex.force));
     // A size above 1 / epsilon times the displacement may be reduced to it without loss.
     const Scalar size = smaller<Scalar>(vertex.size, unreduced / Limits::epsilon() + (Limits::min)());
     // With b as above: rho^2 + (size (1 - b / stiffness) - unreduced) rho = unreduced size.

@@ -112,7 +112,7 @@ template <Real Scalar>
 
 /// Whether a corner is fixed, or was shared by several constraints in the last step.
 template <Real Scalar>
-[[nodiscard]] bool is_on_fixed(const ConstraintContext<Scalar>& context, const std::array<Index, 3>& corners) noexcept {
+[[nodiscard]] bool is_on_fixed(const ConstraintContext<Scalar>& context, std::span<const Index> corners) noexcept {
     return std::any_of(corners.begin(), corners.end(),
                        [&](Index v) { return context.fixed(v) || context.step().contacts.shared.contains(v); });
 }

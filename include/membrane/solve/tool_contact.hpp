@@ -75,6 +75,9 @@ struct ToolContact {
     void prevent_tunnelling(Context& context) const noexcept;
     [[nodiscard]] bool has_new_overlap(const Context& context) const noexcept;
 
+    [[nodiscard]] static bool is_vertex(const ContactPoint<Scalar>& point) noexcept {
+        return point.feature == vertex_feature;
+    }
     [[nodiscard]] ToolShape<Scalar> shape() const noexcept {
         return {tool.position, tool.axis, contact.patch.axis_point, contact.patch.radius};
     }
@@ -130,10 +133,11 @@ inline constexpr int max_passes = 8, deep_contact_passes = 16;
 
 /// Largest number of passes without deep penetration. With few points each carries a large part of the force, and more
 /// passes reduce its error. Points that are `stiff` (beside fixed corners, or several of a shaft on one triangle)
-/// converge slowly and get all passes.
-[[nodiscard]] constexpr int max_contact_passes(std::size_t points, bool stiff) noexcept {
+/// converge slowly and get all passes. Vertices that carry the contact share no corner: one pass solves them.
+[[nodiscard]] constexpr int max_contact_passes(std::size_t points, std::size_t vertices, bool stiff) noexcept {
     constexpr int least = 2, point_passes = 32;
     if (stiff || points == 0) return max_passes;
+    if (vertices == points) return 1;
     return std::clamp(point_passes / static_cast<int>(points), least, max_passes);
 }
 
@@ -243,7 +247,7 @@ template <Real Scalar>
 void ToolContact<Scalar>::find_points(Context& context) const noexcept {
     const bool as_found = !is_shaft(tool) && !contact.patch.tunnelled;
     for (const auto& found : contact.patch.points) {
-        if (as_found) {
+        if (as_found || is_vertex(found)) {
             add_point(context, found);
             continue;
         }
@@ -258,12 +262,12 @@ template <Real Scalar>
 void ToolContact<Scalar>::add_point(Context& context, ContactPoint<Scalar> point) const noexcept {
     const auto* before = context.cached_point(point.triangle, point.feature, point.corners[0]);
     const Scalar distance = point.gap + contact.patch.radius;
-    if (before == nullptr && distance > contact.patch.detection_distance) return;
+    if (before == nullptr && !is_vertex(point) && distance > contact.patch.detection_distance) return;
     const bool apart = distance > contact.patch.radius / 1000;
     point.normal =
         direction(apart ? point.normal : Vector3<Scalar>(contact.patch.previous_axis_point - contact.patch.axis_point),
                   contact.normal);
-    point.on_fixed = is_on_fixed(context, point.corners);
+    point.on_fixed = is_on_fixed(context, point.vertices());
     // Fixed corners do not follow the tool: when a shaft's axis passes them, it stays on the side of the last step. A
     // triangle that a tool has tunnelled through is between its last and its new position.
     const bool keeps_side = before != nullptr && is_shaft(tool);
@@ -394,7 +398,9 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
     bool released = false;
     const auto points = std::as_const(context).points();
     const bool on_fixed = std::any_of(points.begin(), points.end(), [](const auto& point) { return point.on_fixed; });
-    const int most = detail::max_contact_passes(points.size(), on_fixed || is_shaft(tool));
+    const auto vertices = static_cast<std::size_t>(std::count_if(points.begin(), points.end(), is_vertex));
+    const bool stiff = on_fixed || (is_shaft(tool) && vertices < points.size());
+    const int most = detail::max_contact_passes(points.size(), vertices, stiff);
     bool deep = false;
     for (int i = 0; i < (takes_turns ? 1 : detail::deep_contact_passes); ++i) {
         const auto pass = solve_contacts(step.rows, step.contacts, shape(), packs(context), i > 0);
@@ -424,7 +430,8 @@ bool ToolContact<Scalar>::has_new_overlap(const Context& context) const noexcept
     const int features = feature_pairs(tool);
     const auto points = context.points();
     auto next = points.begin();  // in the order of the triangles
-    for (const auto& listed : contact.patch.triangles) {
+    while (next != points.end() && is_vertex(*next)) ++next;
+    for (const auto& listed : contact.patch.vertices == nullptr ? contact.patch.triangles : contact.patch.faces) {
         for (int feature = 0; feature < features; ++feature) {
             if (next != points.end() && next->triangle == listed.triangle && next->feature == feature) {
                 ++next;

@@ -212,7 +212,7 @@ template <Real Scalar>
 void ToolFriction<Scalar>::list_corners(const Context& context) noexcept {
     corners_.clear();
     for (const auto& point : context.points()) {
-        for (const Index v : point.corners) {
+        for (const Index v : point.vertices()) {
             if (!corners_.try_push_back(v)) break;
         }
     }
@@ -259,7 +259,7 @@ void ToolFriction<Scalar>::read_normal_forces(const Context& context) noexcept {
             const auto& normal = pack.load.normal;
             const Vector3<Scalar> force =
                 -pack.load.force[i] * Vector3<Scalar>(normal[0][i], normal[1][i], normal[2][i]);
-            for (std::size_t k = 0; k < 3; ++k) {
+            for (std::size_t k = 0; k < corner_count(pack.kind); ++k) {
                 auto* const v = find(vertices_.items(), row_at(pack.corner[k][i]));
                 if (v == nullptr) continue;
                 v->normal_force += pack.load.weights[static_cast<Eigen::Index>(k)][i] * force;

@@ -166,9 +166,13 @@ struct VertexRows {
     Rows force;                           ///< `constraint_force`, `contact_stiffness`
     Rows response;                        ///< two rows for each vertex, of `response_of`
     Rows residual;                        ///< `residual_force`, `unbalanced_force`
+    Rows wall;                            ///< of vertices that carry a contact: they stay behind a plane. Its normal,
+                                          ///< zero without a wall, and how far along it the vertex may go [m]
+    std::vector<Scalar> multiplier;       ///< of vertices with a wall: the force on them against its normal [N]
     std::vector<Scalar> added_stiffness;  ///< that constraints add in all directions [N/m]
     std::vector<Scalar> external_force;   ///< sum of the sizes of forces given in this step, as by `PointLoad` [N]
     bool has_external_forces = false;     ///< in this step
+    bool has_walls = false;               ///< in this step
 
     ///@{
     /// Vertices whose positions are loaded, that are seeds, that constraints prescribe, or on which their forces act.
@@ -205,6 +209,8 @@ VertexRows<Scalar>::VertexRows(Index vertices)
       force(position),
       response(2 * position.size()),
       residual(position),
+      wall(position),
+      multiplier(position.size(), 0),
       added_stiffness(position.size(), 0),
       external_force(position.size(), 0),
       loaded(vertices),
@@ -217,10 +223,11 @@ template <Real Scalar>
 void VertexRows<Scalar>::begin_step() noexcept {
     for (const Index v : forced.items()) {
         row(force, v) = {};
+        if (has_walls) row(wall, v) = {};
         added_stiffness[static_cast<std::size_t>(v)] = external_force[static_cast<std::size_t>(v)] = 0;
     }
     for (IndexSet* set : {&loaded, &seeds, &prescribed, &forced}) set->clear();
-    has_external_forces = false;
+    has_external_forces = has_walls = false;
 }
 
 template <Real Scalar>

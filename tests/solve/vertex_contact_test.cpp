@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include <membrane/accuracy/equilibrium.hpp>
+#include <membrane/contact/contact_tracker.hpp>
+#include <membrane/solve/quasi_static.hpp>
+#include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/shapes.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+// Contact carried by vertices, see `ContactVertices`, in a step.
+
+using namespace membrane;
+using Point = Vector3<double>;
+
+namespace {
+
+constexpr double body_radius = 0.01, tick = 1e-3;  // [m], [s]
+const Point start = Point(0.31, 0.17, 0.93).normalized();
+const Point along = start.cross(Point(0.7, -0.5, 0.2)).normalized();
+
+/// A sphere on volume springs, of the same stiffness per area on each mesh, under a tool that presses and slides.
+template <Real S>
+struct Scene {
+    TriangleMesh<S> mesh;
+    MassSpringNetwork<S, LinearSpring> network{mesh, {}, {.stiffness = S(40)}};
+    VirtualVolumeSprings<S> foundation;
+    QuasiStaticSolver<S> solver;
+    AabbTree<S> tree{mesh};
+    ContactTracker<S> tracker;
+    Points<S> x = mesh.positions();
+    Tool<S> tool{};
+    Contact<S> contact = Contact<S>::none();
+
+    Scene(int subdivisions, double fine_triangles, const SolverOptions<S>& options, double damping = 0)
+        : mesh(icosphere<S>({.radius = S(body_radius), .subdivisions = subdivisions})),
+          foundation(mesh, {.stiffness = S(8 * std::pow(4.0, 4 - subdivisions)), .damping = S(damping)}),
+          solver(network, options),
+          tracker(mesh, {.fine_triangles = fine_triangles}) {}
+
+    /// Presses the tool `depth` deep at `angle` from the start.
+    StepReport<S> press_at(double depth, double angle, double radius = 2e-3, const Point& axis = Point::Zero()) {
+        const Point outward = std::cos(angle) * start + std::sin(angle) * along;
+        tool.position = ((body_radius + radius - depth) * outward).cast<S>();
+        tool.axis = axis.cast<S>();
+        tool.radius = S(radius);
+        contact = tracker.update(tree, x, tool);
+        const auto report = solver.step(x, S(tick), network, foundation, press(tool, contact));
+        tree.refit(x, report.moved);
+        return report;
+    }
+    /// The largest overlap of a vertex that carries the contact with the tool and its lift [m].
+    [[nodiscard]] double overlap() const {
+        double largest = 0;
+        for (const auto& point : contact.patch.points) {
+            const auto separation = to_segment<S>(membrane::point(x, point.corners[0]), tool.position, tool.axis);
+            if (point.feature == vertex_feature)
+                largest = std::max(largest, static_cast<double>(tool.radius + point.lift - norm(separation)));
+        }
+        return largest;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("with contact by vertices, steps converge to Newton's equilibrium", "[contact]") {
+    test::Random random(1);
+    for (int i = 0; i < cases(12); ++i) {
+        CAPTURE(i);
+        Scene<double> scene(3, 0.5, {.layers = unlimited, .sweeps = 50});
+        const double depth = random.number(0.2e-3, 1.5e-3), angle = random.number(0.0, 3.0);
+        const Point axis = random.chance(0.5) ? Point(4e-3 * random.unit_vector() + 8e-3 * start) : Point::Zero();
+        double force = 0;
+        bool converged = false;
+        for (int t = 1; t <= 200 && !converged; ++t) {
+            const auto report = scene.press_at(depth * std::min(t, 20) / 20, angle, 2e-3, axis);
+            REQUIRE(report.status == StepStatus::advanced);
+            force = norm(report.reactions[0]);
+            converged = t > 20 && report.converged;
+        }
+        CHECK(converged);
+        const auto rest =
+            equilibrium(scene.x, scene.mesh, scene.network, scene.foundation, {}, press(scene.tool, scene.contact));
+        REQUIRE(rest.converged);
+        CHECK((scene.x - rest.x).cwiseAbs().maxCoeff() < 1e-9);
+        CHECK(force == Approx(norm(rest.reactions[0])).epsilon(1e-7));
+        double sum = 0;
+        for (const auto& point : scene.solver.contact_points(0)) {
+            REQUIRE(point.feature == vertex_feature);
+            const auto gap = norm(to_segment<double>(membrane::point(scene.x, point.corners[0]), scene.tool.position,
+                                                     scene.tool.axis)) -
+                             scene.tool.radius - point.lift;
+            CHECK(gap > -1e-9);
+            if (norm(point.force) > 1e-7) CHECK(gap < 1e-9);  // only a vertex that touches pushes
+            sum += norm(point.force);
+        }
+        CHECK(sum >= force);
+    }
+}
+
+TEST_CASE("the force of a ball converges with the mesh, from coarse ones on", "[contact]") {
+    const auto force_on = [](int subdivisions, double fine_triangles) {
+        Scene<double> scene(subdivisions, fine_triangles, {.layers = unlimited, .sweeps = 20});
+        double force = 0;
+        for (int t = 1; t <= 60; ++t) force = norm(scene.press_at(1e-3 * std::min(t, 40) / 40, 0).reactions[0]);
+        return force;
+    };
+    constexpr double continuum = 0.07748;  // the limit of both kinds of contact, extrapolated from 40,962 vertices
+    const std::array<double, 3> bars{0.1, 0.015, 0.005};
+    for (int subdivisions = 3; subdivisions <= cases(4, 5); ++subdivisions) {
+        CAPTURE(subdivisions);
+        const double error = std::abs(force_on(subdivisions, 0.5) / continuum - 1);
+        CHECK(error < bars[static_cast<std::size_t>(subdivisions - 3)]);
+        CHECK(force_on(subdivisions, 0) / continuum - 1 > 5 * error);  // by faces
+    }
+}
+
+TEMPLATE_TEST_CASE("no vertex ends a tick in the tool, at any depth and speed, and the membrane comes back",
+                   "[contact]", TEST_SCALARS) {
+    using S = TestType;
+    test::Random random(2);
+    for (int i = 0; i < cases(20, 200); ++i) {
+        CAPTURE(i);
+        const double depth = random.number(0.5e-3, 2e-3), speed = random.number(0.02, 0.1);
+        const SolverOptions<S> options{.layers = random.chance(0.5) ? 3 : 6, .sweeps = random.index(2) + 1};
+        Scene<S> scene(random.index(2) + 3, 0.5, options, 0.02);
+        const Point axis = random.chance(0.3) ? Point(4e-3 * random.unit_vector() + 8e-3 * start) : Point::Zero();
+        double overlap = 0, angle = 0;
+        for (int t = 1; t <= 160; ++t) {
+            if (t > 40) angle += speed * tick / body_radius;
+            REQUIRE(scene.press_at(depth * std::min(t, 40) / 40, angle, 2e-3, axis).status == StepStatus::advanced);
+            overlap = std::max(overlap, scene.overlap());
+        }
+        CHECK(overlap < 0.01 * body_radius / 8);  // 1 % of an edge
+        for (int t = 1; t <= 150; ++t) {
+            static_cast<void>(scene.press_at(depth - t * 1e-4, angle, 2e-3, axis));
+        }
+        CHECK(static_cast<double>((scene.x - scene.mesh.positions()).cwiseAbs().maxCoeff()) < 1e-6);
+    }
+}
