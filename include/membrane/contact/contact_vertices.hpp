@@ -13,8 +13,9 @@
 ///
 ///     auto tracker = membrane::ContactTracker(mesh, {.fine_triangles = 0.5});
 ///     const auto contact = tracker.update(tree, x, tool);
-///     if (contact.touching() && contact.patch.vertices->carries(v, tool.radius)) {
-///         std::printf("%g m outside\n", contact.patch.vertices->lift(v, tool.radius));
+///     const auto* carriers = contact.patch.vertices;                         // null: faces carry the contact
+///     if (carriers != nullptr && carriers->carries(v, tool.radius)) {
+///         std::printf("%g m outside\n", carriers->lift(v, tool.radius));
 ///     }
 namespace membrane {
 
