@@ -78,7 +78,7 @@ namespace detail {
 [[nodiscard]] inline bool is_beside_axis(const ToolPoint& point, const Points<double>& x,
                                          const Tool<double>& tool) noexcept {
     if (point.part() != vertex_feature) return false;
-    const double along = dot<double>(membrane::point(x, point.corners[0]) - tool.position, tool.axis);
+    const auto along = dot<double>(membrane::point(x, point.corners[0]) - tool.position, tool.axis);
     return along > 0 && along < squared_norm(tool.axis);
 }
 

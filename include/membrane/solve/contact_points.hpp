@@ -74,10 +74,10 @@ namespace detail {
 
 /// Calls `act` with the number of each of the corners, 1 or 3. Unrolled by hand: compilers do not unroll a long loop,
 /// and keep its data in memory.
-template <std::size_t Corners, class Act>
+template <std::size_t corners, class Act>
 MEMBRANE_INLINE void each_corner(const Act& act) noexcept {
     act(std::integral_constant<std::size_t, 0>());
-    if constexpr (Corners == 3) {
+    if constexpr (corners == 3) {
         act(std::integral_constant<std::size_t, 1>());
         act(std::integral_constant<std::size_t, 2>());
     }
@@ -226,12 +226,12 @@ inline constexpr int corners_at_once = 2;
 /// Adds the change of a pack's forces since they were last applied to the rows of forces, and that of its rocking
 /// stiffness: along the total force on a corner; beside fixed or shared corners in all directions. There a point may
 /// press hard with little weight on its free corners, and other points set the direction of the total force on them.
-template <std::size_t Corners, Real Scalar>
+template <std::size_t corners, Real Scalar>
 MEMBRANE_NOINLINE MEMBRANE_FLATTEN void add_forces(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
                                                    ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     const auto &load = pack.load, &applied = pack.applied;
-    each_corner<Corners>([&](std::size_t k) {
+    each_corner<corners>([&](std::size_t k) {
         const auto i = static_cast<Eigen::Index>(k);
         auto row = gather_padded(rows.force.data(), pack.corner[k].data());
         const Wide now = load.force * load.weights[i], before = applied.force * applied.weights[i];
@@ -260,12 +260,12 @@ struct SupportOfPack {
     Lanes<Scalar> force = 0, stiffness = 0;  // sums over these corners [N], [N/m]
 };
 
-template <std::size_t Corners, Real Scalar>
+template <std::size_t corners, Real Scalar>
 [[nodiscard]] SupportOfPack<Scalar> support_of(const ContactState<Scalar>& contacts,
                                                const ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     SupportOfPack<Scalar> sum;
-    for (std::size_t k = 0; k < Corners; ++k) {
+    for (std::size_t k = 0; k < corners; ++k) {
         const auto i = static_cast<Eigen::Index>(k);
         const auto support = gather_padded(contacts.support.data(), pack.corner[k].data());
         const auto others = gather_padded(contacts.opposing.data(), pack.corner[k].data());
@@ -286,47 +286,47 @@ template <std::size_t Corners, Real Scalar>
     return sum;
 }
 
-template <std::size_t Corners, Real Scalar>
-[[nodiscard]] MEMBRANE_INLINE std::array<PaddedLanes<Scalar>, Corners> corners_of(
+template <std::size_t corners, Real Scalar>
+[[nodiscard]] MEMBRANE_INLINE std::array<PaddedLanes<Scalar>, corners> corners_of(
     const VertexRows<Scalar>& rows, const ContactPack<Scalar>& pack) noexcept {
-    std::array<PaddedLanes<Scalar>, Corners> corner;
-    each_corner<Corners>(
+    std::array<PaddedLanes<Scalar>, corners> corner;
+    each_corner<corners>(
         [&](std::size_t k) { corner[k] = gather_padded(rows.position.data(), pack.corner[k].data()); });
     return corner;
 }
 
 /// The points of a pack at the current positions.
-template <std::size_t Corners, Real Scalar>
+template <std::size_t corners, Real Scalar>
 struct LocatedPack {
-    std::array<PaddedLanes<Scalar>, Corners> corner;
+    std::array<PaddedLanes<Scalar>, corners> corner;
     SupportOfPack<Scalar> support;
     Lanes<Scalar> gap;  // beyond the lift, along the normals, with the displacement of fixed corners [m]
 };
 
 /// Locates the points of a pack. Fixed corners respond to the forces so far, which are added to the rows.
-template <std::size_t Corners, Real Scalar>
-[[nodiscard]] MEMBRANE_NOINLINE MEMBRANE_FLATTEN LocatedPack<Corners, Scalar> located_pack(
+template <std::size_t corners, Real Scalar>
+[[nodiscard]] MEMBRANE_NOINLINE MEMBRANE_FLATTEN LocatedPack<corners, Scalar> located_pack(
     VertexRows<Scalar>& rows, ContactState<Scalar>& contacts, const ToolShape<Scalar>& tool,
     ContactPack<Scalar>& pack) noexcept {
-    LocatedPack<Corners, Scalar> now{corners_of<Corners>(rows, pack), {}, 0};
+    LocatedPack<corners, Scalar> now{corners_of<corners>(rows, pack), {}, 0};
     locate(tool, now.corner, pack);
     if (pack.on_fixed) {
-        add_forces<Corners>(rows, contacts, pack);
-        now.support = support_of<Corners>(contacts, pack);
+        add_forces<corners>(rows, contacts, pack);
+        now.support = support_of<corners>(contacts, pack);
     }
     now.gap = pack.distance - now.support.displacement - (tool.radius + pack.lift);
-    if constexpr (Corners == 1) pack.wall = dot(pack.load.normal, now.corner[0].point) + now.gap;
+    if constexpr (corners == 1) pack.wall = dot(pack.load.normal, now.corner[0].point) + now.gap;
     return now;
 }
 
 /// A negligible gap: the response to a negligible force, or a few roundings [m].
-template <std::size_t Corners, Real Scalar>
+template <std::size_t corners, Real Scalar>
 [[nodiscard]] MEMBRANE_INLINE Lanes<Scalar> gap_tolerance(const VertexRows<Scalar>& rows,
-                                                          const LocatedPack<Corners, Scalar>& now,
+                                                          const LocatedPack<corners, Scalar>& now,
                                                           const ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     Wide sum = 0;
-    for (std::size_t k = 0; k < Corners; ++k) {
+    for (std::size_t k = 0; k < corners; ++k) {
         const Wide& weight = pack.load.weights[static_cast<Eigen::Index>(k)];
         const Wide& compliance = now.corner[k].extra;
         sum += weight * weight * compliance;
@@ -337,24 +337,24 @@ template <std::size_t Corners, Real Scalar>
 }
 
 /// Response of the corners of a pack to a unit force along the normal, and the internal force and stiffness there.
-template <std::size_t Corners, Real Scalar>
+template <std::size_t corners, Real Scalar>
 struct PackResponse {
-    std::array<Vector3<Lanes<Scalar>>, Corners> of_corner;  // to its part of the force [m/N]
+    std::array<Vector3<Lanes<Scalar>>, corners> of_corner;  // to its part of the force [m/N]
     Lanes<Scalar> compliance;                               // of the points [m/N]
     Lanes<Scalar> balanced_force;      // largest that internal and external forces there balance [N]
     Lanes<Scalar> internal_stiffness;  // sum over the corners [N/m]
 };
 
-template <std::size_t Corners, Real Scalar>
-[[nodiscard]] MEMBRANE_INLINE PackResponse<Corners, Scalar> response_of(const VertexRows<Scalar>& rows,
+template <std::size_t corners, Real Scalar>
+[[nodiscard]] MEMBRANE_INLINE PackResponse<corners, Scalar> response_of(const VertexRows<Scalar>& rows,
                                                                         const SupportOfPack<Scalar>& support,
                                                                         const ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
-    PackResponse<Corners, Scalar> response;
+    PackResponse<corners, Scalar> response;
     response.compliance = support.compliance;
     response.balanced_force = support.force;
     response.internal_stiffness = support.stiffness;
-    each_corner<Corners>([&](std::size_t k) {
+    each_corner<corners>([&](std::size_t k) {
         const auto corner = rows.responses(pack.corner[k]);
         const Wide& weight = pack.load.weights[static_cast<Eigen::Index>(k)];
         response.of_corner[k] = weight * (corner.compliance * pack.load.normal);
@@ -372,9 +372,9 @@ template <std::size_t Corners, Real Scalar>
 
 /// Changes the force of each acting point by its gap over its compliance, never below zero, and moves the corners by
 /// their response. Returns the absolute change [N].
-template <std::size_t Corners, Real Scalar>
+template <std::size_t corners, Real Scalar>
 MEMBRANE_INLINE Lanes<Scalar> solve(VertexRows<Scalar>& rows, const typename Lanes<Scalar>::Mask& acts,
-                                    const PackResponse<Corners, Scalar>& response, LocatedPack<Corners, Scalar>& now,
+                                    const PackResponse<corners, Scalar>& response, LocatedPack<corners, Scalar>& now,
                                     ContactPack<Scalar>& pack, ContactPass<Scalar>& pass) noexcept {
     using Wide = Lanes<Scalar>;
     const auto moves = acts & (response.compliance > 0);
@@ -396,7 +396,7 @@ MEMBRANE_INLINE Lanes<Scalar> solve(VertexRows<Scalar>& rows, const typename Lan
     pack.load.force += change;
     // So large a change has no linear response: the next updates of the corners follow a release.
     const Wide linear = select<Wide>(too_hard, 0, change);
-    each_corner<Corners>([&](std::size_t k) {
+    each_corner<corners>([&](std::size_t k) {
         now.corner[k].point -= linear * response.of_corner[k];
         scatter_padded(now.corner[k], rows.position.data(), pack.corner[k].data());
     });
@@ -404,15 +404,15 @@ MEMBRANE_INLINE Lanes<Scalar> solve(VertexRows<Scalar>& rows, const typename Lan
 }
 
 /// `push_out` for one pack.
-template <std::size_t Corners, Real Scalar>
+template <std::size_t corners, Real Scalar>
 [[nodiscard]] bool push_out(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts, const ToolShape<Scalar>& tool,
                             ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
-    auto now = located_pack<Corners>(rows, contacts, tool, pack);
+    auto now = located_pack<corners>(rows, contacts, tool, pack);
     const auto inside = (pack.used > 0) & (-now.gap > gap_tolerance(rows, now, pack));
-    if (!any(inside) || (Corners == 1 && !pack.on_fixed)) return false;  // the updates move vertices out
+    if (!any(inside) || (corners == 1 && !pack.on_fixed)) return false;  // the updates move vertices out
     const Wide part = select<Wide>(inside, now.gap / squared_norm(pack.load.weights), 0);
-    each_corner<Corners>([&](std::size_t k) {
+    each_corner<corners>([&](std::size_t k) {
         const auto i = static_cast<Eigen::Index>(k);
         now.corner[k].point += (part * pack.load.weights[i] * pack.free[i]) * pack.load.normal;
         scatter_padded(now.corner[k], rows.position.data(), pack.corner[k].data());
@@ -442,29 +442,29 @@ template <Real Scalar>
 }
 
 /// `solve_contacts` for one pack: the absolute changes of its forces [N].
-template <std::size_t Corners, Real Scalar>
+template <std::size_t corners, Real Scalar>
 [[nodiscard]] MEMBRANE_INLINE Lanes<Scalar> solve_pack(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts,
                                                        const ToolShape<Scalar>& tool, ContactPack<Scalar>& pack,
                                                        ContactPass<Scalar>& pass) noexcept {
     using Wide = Lanes<Scalar>;
-    if constexpr (Corners == 1) {
+    if constexpr (corners == 1) {
         if (pack.has_walls) {
             const Wide change = follow_vertices(rows, contacts, tool, pack);
             if (pack.has_walls) return change;
         }
     }
-    auto now = located_pack<Corners>(rows, contacts, tool, pack);
+    auto now = located_pack<corners>(rows, contacts, tool, pack);
     const auto acts = (pack.used > 0) & ((pack.load.force > 0) | (now.gap < 0));
     pack.acts = any(acts);
     if (!pack.acts) return 0;
-    if constexpr (Corners == 3) {
+    if constexpr (corners == 3) {
         const auto allowed = static_cast<Scalar>(deep_overlap * deep_overlap);
         const Wide edge_square = squared_norm<Wide>(now.corner[1].point - now.corner[0].point);
         pass.deep = pass.deep || any((pack.used > 0) & (now.gap < 0) & (now.gap * now.gap > allowed * edge_square));
     }
-    const auto response = response_of<Corners>(rows, now.support, pack);
+    const auto response = response_of<corners>(rows, now.support, pack);
     const Wide change = solve(rows, acts, response, now, pack, pass);
-    if (pack.on_fixed) add_forces<Corners>(rows, contacts, pack);
+    if (pack.on_fixed) add_forces<corners>(rows, contacts, pack);
     return change;
 }
 
