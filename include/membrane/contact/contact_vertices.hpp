@@ -52,10 +52,10 @@ class ContactVertices {
     /// Whether `v` carries the contact with a tool of this radius [m]; whether all corners do, and so the face does
     /// not.
     [[nodiscard]] bool carries(Index v, double radius) const noexcept {
-        return fine_ > 0 && squares_[at(v)].largest <= fine_ * fine_ * radius * radius;
+        return any() && squares_[at(v)].largest <= fine_ * fine_ * radius * radius;
     }
     [[nodiscard]] bool carry(const std::array<Index, 3>& corners, double radius) const noexcept {
-        return any() && std::all_of(corners.begin(), corners.end(), [&](Index v) { return carries(v, radius); });
+        return std::all_of(corners.begin(), corners.end(), [&](Index v) { return carries(v, radius); });
     }
     ///@}
 
@@ -63,7 +63,7 @@ class ContactVertices {
     /// How far outside a tool of this radius `v` stays, and at most any that carries the contact [m].
     [[nodiscard]] double lift(Index v, double radius) const noexcept { return above(radius, squares_[at(v)].mean); }
     [[nodiscard]] double largest_lift(double radius) const noexcept {
-        return fine_ > 0 ? above(radius, fine_ * fine_ * radius * radius) : 0;
+        return any() ? above(radius, fine_ * fine_ * radius * radius) : 0;
     }
     ///@}
 
@@ -100,7 +100,7 @@ namespace detail {
 
 template <Real Scalar>
 void ContactVertices::measure(const LocalSurface<Scalar>& surface, const ConstPointsRef<Scalar>& x, Index v) noexcept {
-    if (!(fine_ > 0)) return;
+    if (!any()) return;
     Squares found;
     const auto around = surface.triangles_of(v);
     for (const Index f : around) {

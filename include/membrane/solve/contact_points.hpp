@@ -509,7 +509,7 @@ MEMBRANE_FLATTEN void apply_forces(VertexRows<Scalar>& rows, ContactState<Scalar
                                    std::span<ContactPack<Scalar>> packs) noexcept {
     for (auto& pack : packs) {
         auto& load = pack.load;
-        if (!any((load.force > 0) | (pack.applied.force > 0))) continue;
+        if (pack.has_walls || !any((load.force > 0) | (pack.applied.force > 0))) continue;  // walls: done with them
         if (pack.kind == ContactKind::vertex) {
             detail::add_forces<1>(rows, contacts, pack);
             continue;

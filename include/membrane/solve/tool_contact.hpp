@@ -430,7 +430,7 @@ bool ToolContact<Scalar>::has_new_overlap(const Context& context) const noexcept
     if (on_support(context)) return false;  // contact is at this point only
     const int features = feature_pairs(tool);
     const auto points = context.points();
-    auto next = points.begin();  // in the order of the triangles
+    auto next = points.begin();  // vertices first, then in the order of the triangles
     while (next != points.end() && is_vertex(*next)) ++next;
     for (const auto& listed : contact.patch.vertices == nullptr ? contact.patch.triangles : contact.patch.faces) {
         for (int feature = 0; feature < features; ++feature) {

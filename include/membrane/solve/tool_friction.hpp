@@ -243,9 +243,7 @@ void ToolFriction<Scalar>::begin(Context& context, const Tool<Scalar>& tool) noe
 
 template <Real Scalar>
 void ToolFriction<Scalar>::hold(Vertex& v, const Vector3<Scalar>& position, const Tool<Scalar>& tool) noexcept {
-    const auto square = squared_norm<Scalar>(tool.axis);
-    const Scalar along = square > 0 ? dot<Scalar>(position - tool.position, tool.axis) / square : Scalar(0);
-    v.along = std::clamp(along, Scalar(0), Scalar(1));
+    v.along = detail::fraction<Scalar>(dot<Scalar>(position - tool.position, tool.axis), squared_norm(tool.axis));
     v.offset = position - on_tool(tool, v);
 }
 
