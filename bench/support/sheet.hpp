@@ -54,6 +54,7 @@ struct Sheet {
     double loaded_radius = 1;     ///< the pressure is on triangles within this distance of the z axis [m]
     double foundation = 0;        ///< along the normal [Pa/m]
     std::vector<Index> pinned{};  ///< vertices that keep their positions
+    double fine_triangles = 0;    ///< where vertices carry the contact, see `TrackerOptions`
 
     /// The equilibrium with pinned vertices where `x` has them. @throws std::runtime_error if none is found
     [[nodiscard]] membrane::Equilibrium equilibrium(const Points& x, const std::vector<Tool>& tools = {}) const;
@@ -135,7 +136,8 @@ struct Sheet {
 
 inline membrane::Equilibrium Sheet::equilibrium(const Points& x, const std::vector<Tool>& tools) const {
     return with_model([&](const auto& tissue, const auto& springs) {
-        std::vector<membrane::ContactTracker<double>> trackers(tools.size(), membrane::ContactTracker<double>(mesh));
+        const membrane::ContactTracker<double> tracker(mesh, {.fine_triangles = fine_triangles});
+        std::vector<membrane::ContactTracker<double>> trackers(tools.size(), tracker);
         const auto pressed = [&](std::size_t i) {
             return membrane::press(tools[i], contact_of(mesh, x, tools[i], trackers[i]));
         };

@@ -57,8 +57,9 @@ inline constexpr double start_gap = 0.01;  // between ball and sheet before the 
 /// What stands for the ball on flat triangles.
 enum class Ball {
     as_it_is,
-    smaller,    ///< by `tool_radius()` of the mean edge
-    corrected,  ///< moved back by `FacetCorrection`
+    by_vertices,  ///< which carry the contact wherever they may
+    smaller,      ///< by `tool_radius()` of the mean edge
+    corrected,    ///< moved back by `FacetCorrection`
 };
 
 /// A ball at (x, 0), to be compared with another program; if x is not 0, a second one at (-x, 0) does the same.
@@ -97,7 +98,8 @@ inline Column BallScene::calculix(const Effort& effort, const std::string& name,
 }
 
 inline std::vector<double> BallScene::forces(const Mesh& mesh, Ball kind, double edge) const {
-    const Sheet sheet = flat_sheet(mesh);
+    Sheet sheet = flat_sheet(mesh);
+    if (kind == Ball::by_vertices) sheet.fine_triangles = 1;
     Points position = mesh.positions();
     std::vector<double> found;
     for (const double depth : depths) {
@@ -158,6 +160,8 @@ struct Placement {
     }
     for (const auto& place : fine) {
         table.ours.push_back(
+            single(place.name + ", by vertices", [&] { return scene.forces(place.mesh, Ball::by_vertices); }));
+        table.ours.push_back(
             single(place.name + ", radius as it is", [&] { return scene.forces(place.mesh, Ball::as_it_is); }));
         table.ours.push_back(
             single(place.name + ", smaller radius", [&] { return scene.forces(place.mesh, Ball::smaller); }));
@@ -193,6 +197,7 @@ struct Placement {
     table.ours.push_back(compared(effort.rings_name(), effort.rings,
                                   [&](int rings) { return scene.forces(disc_with_patch(rings), Ball::corrected); }));
     const Mesh mesh = disc_with_patch(effort.rings);
+    table.ours.push_back(single("by vertices", [&] { return scene.forces(mesh, Ball::by_vertices); }));
     table.ours.push_back(single("radius as it is", [&] { return scene.forces(mesh, Ball::as_it_is); }));
     table.ours.push_back(single("smaller radius", [&] { return scene.forces(mesh, Ball::smaller); }));
     const Mesh graded = disc_for_loads(effort.rings, {{.centre = {scene.x, 0, 0}, .radius = scene.radius / 2},

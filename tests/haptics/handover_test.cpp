@@ -62,19 +62,20 @@ struct Ticks {
 };
 
 /// `write(number)` for numbers up to `last` in one thread, `read(complete)` in another until it returns the last
-/// number; `complete` is that of a write that was over before.
+/// number; `complete` is that of a write that was over before. Now and then the writer waits for a read: a loaded
+/// machine might run the threads one after the other.
 template <class Write, class Read>
-void grain_size(std::uint64_t last, Write write, Read read) {
-    std::atomic<std::uint64_t> complete{0};
+void race(std::uint64_t last, Write write, Read read) {
+    std::atomic<std::uint64_t> complete{0}, reads{0};
     std::thread writer([&] {
         for (std::uint64_t number = 1; number <= last; ++number) {
             write(number);
             complete.store(number, std::memory_order_release);
-            if (number % 1024 == 0) std::this_thread::yield();  // where there is one processor for both
+            if (number % 1024 != 0 || number == last) continue;
+            for (const auto before = reads.load(); reads.load() == before;) std::this_thread::yield();
         }
     });
-    while (read(complete.load(std::memory_order_acquire)) < last) {
-    }
+    while (read(complete.load(std::memory_order_acquire)) < last) ++reads;
     writer.join();
 }
 
@@ -100,7 +101,7 @@ TEST_CASE("nothing is torn, goes back or is older than the last complete publish
     Latest<Wide> latest;
     const auto last = static_cast<std::uint64_t>(cases(300'000, 10'000'000));
     std::uint64_t torn = 0, backward = 0, stale = 0, before = 0, seen = 0;
-    grain_size(
+    race(
         last, [&](std::uint64_t number) { latest.publish(Wide::of(number), static_cast<double>(number)); },
         [&](std::uint64_t complete) {
             const auto& read = latest.read();
@@ -215,7 +216,7 @@ TEST_CASE("two threads share a membrane, and each snapshot is that of its tick",
     Points<double> shown = expected.x;
     const auto last = static_cast<std::uint64_t>(cases(300'000, 10'000'000));
     std::uint64_t torn = 0, backward = 0, stale = 0, seen = 0;
-    grain_size(
+    race(
         last,
         [&](std::uint64_t number) {
             written();

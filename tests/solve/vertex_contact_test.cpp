@@ -73,7 +73,7 @@ TEST_CASE("with contact by vertices, steps converge to Newton's equilibrium", "[
     test::Random random(1);
     for (int i = 0; i < cases(12); ++i) {
         CAPTURE(i);
-        Scene<double> scene(3, 0.5, {.layers = unlimited, .sweeps = 50});
+        Scene<double> scene(i == 0 ? 4 : 3, 0.5, {.layers = unlimited, .sweeps = 50});
         const double depth = random.number(0.2e-3, 1.5e-3), angle = random.number(0.0, 3.0);
         const Point axis = random.chance(0.5) ? Point(4e-3 * random.unit_vector() + 8e-3 * start) : Point::Zero();
         double force = 0;

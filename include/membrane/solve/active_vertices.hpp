@@ -283,9 +283,10 @@ template <class Network>
 void ActiveVertices::wake_neighbours(const Network& network, Index v) noexcept {
     const auto checked = [&](Index other) { return has_frontier_ && queue_.contains(other); };
     for (const auto& end : network.neighbours(v)) {
+        if (active_.contains(end.other)) continue;
         const bool may_wake =
             as_needed_ ? !network.pinned(end.other) && !checked(end.other) : activated_.contains(end.other);
-        if (may_wake && !active_.contains(end.other)) next_awake_.insert(end.other);
+        if (may_wake) next_awake_.insert(end.other);
     }
 }
 

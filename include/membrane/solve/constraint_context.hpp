@@ -105,8 +105,8 @@ class ConstraintContext {
 
     /// Puts `v` into layer 0 of the queue: a force enters here.
     void seed(Index v) noexcept {
+        if (!step_.rows.seeds.insert(v)) return;
         step_.load(v);
-        step_.rows.seeds.insert(v);
         if (step_.rows.is_fixed(v)) step_.rows.clear_response(v);
     }
 

@@ -362,7 +362,8 @@ template <Real Scalar>
 template <class Scene>
 void PackedVertices<Scalar>::begin_step(const Scene& scene, std::size_t first) noexcept {
     for (std::size_t p = first; p < count(); ++p) {
-        Terms& terms = terms_[p] = {};
+        Terms& terms = terms_[p];
+        terms.mass = 1, terms.free = 0, terms.free_count = 0, terms.damps = false;
         if constexpr (SpringsInLanes<VolumeOf<Scene>, Scalar>) {
             new (&terms.spring) InLanes<SpringOf<VolumeOf<Scene>, Scalar>>();
         }

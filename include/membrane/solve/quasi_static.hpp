@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -683,16 +684,16 @@ template <class Scene>
 bool QuasiStaticSolver<Scalar, Rule>::evaluate_residuals(const Scene& scene) noexcept {
     const bool constrained = !rows_.forced.items().empty() || !rows_.prescribed.items().empty();
     const Scalar largest = detail::too_large<Scalar> / (constrained ? 100 : 1);
-    Scalar squares = 0;
+    Scalar squares = 0, most = 0, most_in_queue = 0;  // of forces [N^2]
     const auto count = [&](Index v) {
         const Vector3<Scalar> force = rows_.residual_force(v);
+        const Scalar square = squared_norm(force);
         ++report_.vertex_updates;
         if (!rows_.is_fixed(v)) {
-            report_.residual = (std::max)(report_.residual, norm(force));
-            if (active_.queue().contains(v))
-                progress_.queue_residual = (std::max)(progress_.queue_residual, norm(force));
+            most = (std::max)(most, square);
+            if (active_.queue().contains(v)) most_in_queue = (std::max)(most_in_queue, square);
         }
-        squares += squared_norm(force) + squared_norm<Scalar>(force - rows_.constraint_force(v)) +
+        squares += square + squared_norm<Scalar>(force - rows_.constraint_force(v)) +
                    squared_norm(rows_.position_of(v));
     };
     const auto evaluate = [&](Index v) {
@@ -713,6 +714,8 @@ bool QuasiStaticSolver<Scalar, Rule>::evaluate_residuals(const Scene& scene) noe
         }
     }
     for (const Index v : prescribed.items()) evaluate(v);  // in packs or not
+    report_.residual = std::sqrt(most);
+    progress_.queue_residual = std::sqrt(most_in_queue);
     return is_finite(squares) && squares < largest * largest;
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include <membrane/contact/contact.hpp>
+#include <membrane/contact/contact_vertices.hpp>
 #include <membrane/contact/grasper.hpp>
 #include <membrane/contact/tool.hpp>
 #include <membrane/solve/constraints.hpp>
@@ -159,8 +160,10 @@ void ToolContact<Scalar>::begin(Context& context) const noexcept {
     sum_support_forces(context, context.constraint());
     const auto out = direction_out_of_support(context);
     if (contact.patch.tunnelled && !out) carry_with_tool(context);
-    list_candidates(context);                                 // after that: `go_back` does not undo it
-    const bool held = is_on_fixed(context, contact.corners);  // a tool penetrates these at equilibrium, too
+    list_candidates(context);  // after that: `go_back` does not undo it
+    const auto* const carriers = contact.patch.vertices;
+    const bool by_vertices = carriers != nullptr && carriers->carry(contact.corners, contact.patch.radius);
+    const bool held = by_vertices || is_on_fixed(context, contact.corners);  // these penetrate at equilibrium, too
     if (!contact.patch.tunnelled && !out && !held && contact.gap < -negligible_distance(context, contact.corners[0])) {
         clear_contact_point(context);
     }
@@ -178,16 +181,15 @@ void ToolContact<Scalar>::begin(Context& context) const noexcept {
 // is no vertex.
 template <Real Scalar>
 bool ToolContact<Scalar>::seed(Context& context) const noexcept {
-    const auto are_vertices = [&](const auto& corners) {
-        return std::all_of(corners.begin(), corners.end(), [&](Index v) { return context.validate(v); });
+    Index least = 0, largest = 0;
+    const auto check = [&](const auto& corners) {
+        for (const Index v : corners) least = (std::min)(least, v), largest = (std::max)(largest, v);
     };
-    if (!are_vertices(contact.corners)) return false;
-    const auto all_are_vertices = [&](const auto& items) {
-        return std::all_of(items.begin(), items.end(), [&](const auto& item) { return are_vertices(item.corners); });
-    };
-    if (!all_are_vertices(contact.patch.triangles) || !all_are_vertices(contact.patch.candidates) ||
-        !all_are_vertices(contact.patch.points))
-        return false;
+    check(contact.corners);
+    for (const auto& listed : contact.patch.triangles) check(listed.corners);
+    for (const auto& listed : contact.patch.candidates) check(listed.corners);
+    for (const auto& found : contact.patch.points) check(found.corners);
+    if (!context.validate(least) || !context.validate(largest)) return false;
     for (const auto& listed : contact.patch.triangles) {
         for (const Index v : listed.corners) context.seed(v);
     }
@@ -199,8 +201,8 @@ template <Real Scalar>
 void ToolContact<Scalar>::list_candidates(Context& context) const noexcept {
     for (const auto& candidate : contact.patch.candidates) {
         for (const Index v : candidate.corners) {
+            if (!context.step().contacts.candidates.insert(v)) continue;
             contact.patch.tunnelled ? keep(context, v) : keep_start(context, v);
-            context.step().contacts.candidates.insert(v);
         }
     }
 }
@@ -219,12 +221,11 @@ void ToolContact<Scalar>::carry_with_tool(Context& context) const noexcept {
         for (const Index v : listed.corners) keep(context, v);
     }
     for (const auto& listed : contact.patch.triangles) {
-        const auto& v = listed.corners;
-        const auto before = kept_triangle(context, v);
+        const auto before = kept_triangle(context, listed.corners);
         const auto hit = first_hit(before, contact.patch.previous_axis_point, contact.patch.axis_point);
         if (!hit) continue;
         const Scalar part = 1 - detail::fraction(hit->fraction * length - contact.patch.radius, length);
-        for (const Index corner : v) {
+        for (const Index corner : listed.corners) {
             if (context.fixed(corner)) continue;
             const Vector3<Scalar> so_far = context.position(corner) - kept(context, corner);
             if (dot(so_far, path) < part * squared_norm(path)) {
@@ -329,8 +330,7 @@ std::optional<Vector3<Scalar>> ToolContact<Scalar>::direction_out_of_support(con
     if (!(fixed.maxCoeff() > 0) || is_shaft(tool)) return std::nullopt;
     Vector3<Scalar> pressed = Vector3<Scalar>::Zero();
     for (const auto& point : context.previous_points()) pressed += point.force;
-    const bool turned = dot(pressed, contact.normal) > 0;
-    const Vector3<Scalar> out = turned ? Vector3<Scalar>(-contact.normal) : contact.normal;
+    const Vector3<Scalar> out = (dot(pressed, contact.normal) > 0 ? Scalar(-1) : Scalar(1)) * contact.normal;
     // A point tool has a contact radius: within half of it from the surface the axis counts as behind.
     const Scalar ahead = (contact.patch.radius - tool.radius) / 2;
     if (!(dot<Scalar>(contact.patch.axis_point - contact.point, out) < ahead)) return std::nullopt;
@@ -396,13 +396,12 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
     const bool takes_turns = step.contacts.several_on_fixed;  // then another constraint's pass comes next
     if (takes_turns) sum_support_forces(context);
     Scalar first_change = 0;  // largest change of a force in the first pass [N]
-    bool released = false;
+    bool released = false, deep = false;
     const auto points = std::as_const(context).points();
     const bool on_fixed = std::any_of(points.begin(), points.end(), [](const auto& point) { return point.on_fixed; });
     const auto vertices = static_cast<std::size_t>(std::count_if(points.begin(), points.end(), is_vertex));
     const bool stiff = on_fixed || (is_shaft(tool) && vertices < points.size());
     const int most = detail::max_contact_passes(points.size(), vertices, stiff);
-    bool deep = false;
     for (int i = 0; i < (takes_turns ? 1 : detail::deep_contact_passes); ++i) {
         const auto pass = solve_contacts(step.rows, step.contacts, shape(), packs(context), i > 0);
         deep = pass.deep && !takes_turns;
