@@ -122,6 +122,7 @@ void bind_tree(py::module_& module) {
 void bind_tracking(py::module_& module) {
     using membrane::TrackerOptions;
     const Keywords options("TrackerOptions", std::pair("margin", &TrackerOptions::margin),
+                           std::pair("fine_triangles", &TrackerOptions::fine_triangles),
                            std::pair("full_query_interval", &TrackerOptions::full_query_interval),
                            std::pair("max_contact_points", &TrackerOptions::max_contact_points));
     auto tracker = py::class_<Tracker>(module, "ContactTracker", doc("ContactTracker"));

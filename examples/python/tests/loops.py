@@ -9,13 +9,13 @@ dt = 1e-3  # [s]
 
 
 def sphere():
-    """A sphere is pressed, grasped and pulled, with a load and two pinned vertices."""
+    """A sphere is pressed, grasped and pulled, with a load and two pinned vertices; vertices carry the contact."""
     mesh = membrane.icosphere(radius=10e-3, subdivisions=3)
     network = membrane.MassSpringNetwork(mesh, stiffness=40.0)
     foundation = membrane.VirtualVolumeSprings(mesh, stiffness=8.0, damping=0.02)
     solver = membrane.QuasiStaticSolver(network, layers=6, sweeps=2)
     tree = membrane.AabbTree(mesh)
-    tracker = membrane.ContactTracker(mesh)
+    tracker = membrane.ContactTracker(mesh, fine_triangles=0.5)
     grasper = membrane.Grasper(mesh)
     normals = membrane.VertexNormals(mesh)
     feel = membrane.SpringDamperForce(stiffness=100, damping=0.5)

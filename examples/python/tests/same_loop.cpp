@@ -39,14 +39,14 @@ void print_points(const Points& x) {
     for (Eigen::Index v = 0; v < x.cols(); ++v) print(membrane::point(x, static_cast<Index>(v)));
 }
 
-/// A sphere is pressed, grasped and pulled, with a load and two pinned vertices.
+/// A sphere is pressed, grasped and pulled, with a load and two pinned vertices; vertices carry the contact.
 void sphere() {
     const auto mesh = membrane::icosphere<double>({.radius = 10e-3, .subdivisions = 3});
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});
     const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
     auto tree = membrane::AabbTree(mesh);
-    auto tracker = membrane::ContactTracker(mesh);
+    auto tracker = membrane::ContactTracker(mesh, {.fine_triangles = 0.5});
     auto grasper = membrane::Grasper(mesh);
     auto normals = membrane::VertexNormals(mesh);
     const auto feel = membrane::SpringDamperForce{.stiffness = 100, .damping = 0.5};
