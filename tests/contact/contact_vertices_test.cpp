@@ -22,6 +22,7 @@
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
+#include "support/meshes.hpp"
 #include "support/random.hpp"
 #include "support/refusal.hpp"
 
@@ -52,19 +53,6 @@ double squared_radius_around(const membrane::Triangle<double>& t) {
     return std::min(least, (t.a - centre).squaredNorm());
 }
 
-/// A sphere whose triangles are small on one side and large on the other.
-Mesh graded_sphere() {
-    const auto mesh = membrane::icosphere<double>({.radius = 5e-3, .subdivisions = 4});
-    membrane::Points<double> x = mesh.positions();
-    for (Index v = 0; v < mesh.vertex_count(); ++v) {  // a Moebius map draws the vertices to one pole
-        const double z = x(2, v) / 5e-3, k = 3, along = ((k * k + 1) * z + k * k - 1) / ((k * k - 1) * z + k * k + 1);
-        const double across = std::sqrt(std::max(0.0, 1 - along * along));
-        const Point around = Point(x(0, v), x(1, v), 0).normalized();
-        if (std::abs(z) < 1) x.col(v) = 5e-3 * (across * around + along * Point::UnitZ());
-    }
-    return {x, mesh.triangles()};
-}
-
 constexpr double disc_radius = 5e-3, stretch = 1.02;  // [m], 1
 const membrane::Material film{.young_modulus = 1e6, .poisson_ratio = 0.45, .thickness = 50e-6};
 
@@ -91,7 +79,7 @@ double error_of_force(const Mesh& mesh, double x, double y, double contact_radiu
 }  // namespace
 
 TEST_CASE("vertices carry a contact where all their triangles are small against the tool", "[contact]") {
-    const Mesh mesh = graded_sphere();
+    const Mesh mesh = test::graded_sphere(5e-3, 4, 3);
     const membrane::LocalSurface<double> surface(mesh);
     for (const double radius : {0.3e-3, 1e-3, 3e-3}) {
         const double fine = 0.4;
@@ -122,7 +110,7 @@ TEST_CASE("vertices carry a contact where all their triangles are small against 
 }
 
 TEST_CASE("the tracker lists each vertex that carries the contact once, and the other faces", "[contact]") {
-    const Mesh mesh = graded_sphere();
+    const Mesh mesh = test::graded_sphere(5e-3, 4, 3);
     const membrane::AabbTree<double> tree(mesh);
     const membrane::LocalSurface<double> surface(mesh);
     const double fine = 0.4;

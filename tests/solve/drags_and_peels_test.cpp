@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -28,7 +29,7 @@ namespace {
 template <Real S>
 struct Loop {
     Random random;
-    double fine_triangles;  // half of the loops have contact by vertices
+    double fine_triangles;  // contact by faces, by vertices, by both
     bool closed = random.chance(0.5), body_moves = random.chance(0.3);
     TriangleMesh<S> mesh = closed ? icosphere<S>({.radius = S(5e-3), .subdivisions = 2})
                                   : disc<S>({.radius = S(5e-3), .rings = random.index(4) + 4});
@@ -61,7 +62,9 @@ struct Loop {
                  .radius = random.chance(0.2) ? S(0) : random.number<S>(S(0.2e-3), S(2e-3))};
     double dissipated = 0;
 
-    explicit Loop(int seed) : random(static_cast<std::uint64_t>(seed)), fine_triangles(seed % 2) {}
+    explicit Loop(int seed)
+        : random(static_cast<std::uint64_t>(seed)),
+          fine_triangles(std::array{0.0, 1.0, 0.3, 0.5}[static_cast<std::size_t>(seed % 4)]) {}
 
     std::vector<S> strengths() {
         std::vector<S> each(static_cast<std::size_t>(mesh.vertex_count()), S(strength));

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include <membrane/accuracy/equilibrium.hpp>
@@ -9,9 +10,11 @@
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
+#include "support/meshes.hpp"
 #include "support/random.hpp"
 
 // Contact carried by vertices, see `ContactVertices`, in a step.
@@ -24,6 +27,14 @@ namespace {
 constexpr double body_radius = 0.01, tick = 1e-3;  // [m], [s]
 const Point start = Point(0.31, 0.17, 0.93).normalized();
 const Point along = start.cross(Point(0.7, -0.5, 0.2)).normalized();
+
+/// The same foundation per area on a mesh of any triangles.
+std::vector<double> foundation_of(const TriangleMesh<double>& mesh) {
+    std::vector<double> stiffness = vertex_areas(mesh);
+    const double whole = std::accumulate(stiffness.begin(), stiffness.end(), 0.0);
+    for (double& area : stiffness) area *= 8 * 2562 / whole;
+    return stiffness;
+}
 
 /// A sphere on volume springs, of the same stiffness per area on each mesh, under a tool that presses and slides.
 template <Real S>
@@ -38,15 +49,22 @@ struct Scene {
     Tool<S> tool{};
     Contact<S> contact = Contact<S>::none();
 
-    Scene(int subdivisions, double fine_triangles, const SolverOptions<S>& options, double damping = 0)
-        : mesh(icosphere<S>({.radius = S(body_radius), .subdivisions = subdivisions})),
-          foundation(mesh, {.stiffness = S(8 * std::pow(4.0, 4 - subdivisions)), .damping = S(damping)}),
+    Scene(const TriangleMesh<S>& of, const Field<S>& stiffness, double fine_triangles, const SolverOptions<S>& options,
+          double damping = 0)
+        : mesh(of),
+          foundation(mesh, {.stiffness = stiffness, .damping = S(damping)}),
           solver(network, options),
           tracker(mesh, {.fine_triangles = fine_triangles}) {}
 
+    Scene(int subdivisions, double fine_triangles, const SolverOptions<S>& options, double damping = 0)
+        : Scene(icosphere<S>({.radius = S(body_radius), .subdivisions = subdivisions}),
+                S(8 * std::pow(4.0, 4 - subdivisions)), fine_triangles, options, damping) {}
+
     /// Presses the tool `depth` deep at `angle` from the start.
     StepReport<S> press_at(double depth, double angle, double radius = 2e-3, const Point& axis = Point::Zero()) {
-        const Point outward = std::cos(angle) * start + std::sin(angle) * along;
+        return press_towards(std::cos(angle) * start + std::sin(angle) * along, depth, radius, axis);
+    }
+    StepReport<S> press_towards(const Point& outward, double depth, double radius, const Point& axis = Point::Zero()) {
         tool.position = ((body_radius + radius - depth) * outward).cast<S>();
         tool.axis = axis.cast<S>();
         tool.radius = S(radius);
@@ -119,6 +137,77 @@ TEST_CASE("the force of a ball converges with the mesh, from coarse ones on", "[
         CHECK(error < bars[static_cast<std::size_t>(subdivisions - 3)]);
         CHECK(force_on(subdivisions, 0) / continuum - 1 > 5 * error);  // by faces
     }
+}
+
+TEST_CASE("on a graded mesh the force does not jump where faces take over from the vertices", "[contact]") {
+    const auto mesh = test::graded_sphere(body_radius, 4, 2.5);  // triangles of 0.08 to 0.5 tool radii
+    const Field<double> stiffness = foundation_of(mesh);
+    const SolverOptions<double> options{.layers = 12, .sweeps = 20};
+    Scene<double> by_vertices(mesh, stiffness, 1, options), by_both(mesh, stiffness, 0.2, options),
+        by_faces(mesh, stiffness, 0, options);
+    const double radius = 2e-3, depth = 0.8e-3;
+    const int places = cases(30, 200);
+    bool both = false;
+    double last = 0, of_faces = 0;
+    for (int i = 0; i < places; ++i) {
+        CAPTURE(i);
+        const double angle = 0.3 + 2.3 * i / (places - 1);
+        const Point outward(std::sin(angle) * std::cos(0.3), std::sin(angle) * std::sin(0.3), std::cos(angle));
+        const auto force_on_ball = [&](Scene<double>& scene) {
+            StepReport<double> report;
+            for (int t = 1; t <= (i == 0 ? 60 : 8); ++t)
+                report = scene.press_towards(outward, i == 0 ? depth * std::min(t, 40) / 40 : depth, radius);
+            return norm(report.reactions[0]);
+        };
+        const double of_vertices = force_on_ball(by_vertices);
+        of_faces = force_on_ball(by_faces);
+        last = force_on_ball(by_both);
+        double least = 1, most = 0;  // of roundness, where the tool presses
+        for (const auto& point : by_both.solver.contact_points(0)) {
+            for (std::size_t k = 0; k < point.vertices().size() && norm(point.force) > 0; ++k) {
+                const double round = by_both.contact.patch.vertices->roundness(point.corners[k], radius);
+                least = std::min(least, round);
+                most = std::max(most, round);
+            }
+        }
+        both = both || (most == 1 && least < 1);
+        CAPTURE(of_vertices, of_faces, last, least);
+        CHECK(last >= of_vertices * (1 - 1e-3));
+        CHECK(last <= of_vertices + (1.2 - least) * (of_faces - of_vertices));
+    }
+    CHECK(both);
+    CHECK(of_faces > 1.7 * 0.054);  // what faces add on the large triangles
+    CHECK(last > 1.4 * 0.054);
+}
+
+TEST_CASE("where faces are lifted, steps converge to Newton's equilibrium", "[contact]") {
+    test::Random random(4);
+    const auto mesh = test::graded_sphere(body_radius, 3, 2);
+    int lifted = 0;
+    for (int i = 0; i < cases(15, 200); ++i) {
+        CAPTURE(i);
+        Scene<double> scene(mesh, foundation_of(mesh), 0.4, {.layers = unlimited, .sweeps = 50});
+        const Point outward = random.unit_vector();
+        const Point axis = random.chance(0.3) ? Point(4e-3 * random.unit_vector() + 8e-3 * outward) : Point::Zero();
+        const double depth = random.number(0.3e-3, 1.2e-3);
+        bool converged = false;
+        for (int t = 1; t <= 200 && !converged; ++t) {
+            const auto report = scene.press_towards(outward, depth * std::min(t, 20) / 20, 2e-3, axis);
+            REQUIRE(report.status == StepStatus::advanced);
+            converged = t > 20 && report.converged;
+        }
+        CHECK(converged);
+        const double force = norm(scene.press_towards(outward, depth, 2e-3, axis).reactions[0]);
+        for (const auto& face : scene.contact.patch.faces) {
+            lifted += scene.contact.patch.vertices->roundness(face.corners[0], 2e-3) > 0;
+        }
+        const auto rest =
+            equilibrium(scene.x, scene.mesh, scene.network, scene.foundation, {}, press(scene.tool, scene.contact));
+        REQUIRE(rest.converged);
+        CHECK((scene.x - rest.x).cwiseAbs().maxCoeff() < 1e-8);
+        CHECK(force == Approx(norm(rest.reactions[0])).epsilon(1e-5));
+    }
+    CHECK(lifted > 0);
 }
 
 TEMPLATE_TEST_CASE("no vertex ends a tick in the tool, at any depth and speed, and the membrane comes back",

@@ -55,6 +55,19 @@ struct Surface {
     void turn(membrane::Index f) { std::swap(triangles(0, f), triangles(1, f)); }
 };
 
+/// A sphere of this radius [m] whose edges at the -z pole are `k` times as long as on an even one, at the +z pole a
+/// `k`-th: a Moebius map draws the vertices to one pole.
+inline membrane::TriangleMesh<double> graded_sphere(double radius, int subdivisions, double k) {
+    const auto mesh = membrane::icosphere<double>({.radius = radius, .subdivisions = subdivisions});
+    membrane::Points<double> x = mesh.positions();
+    for (auto at : x.colwise()) {
+        const double z = at.z() / radius, along = ((k * k + 1) * z + k * k - 1) / ((k * k - 1) * z + k * k + 1);
+        const double across = std::sqrt(std::max(0.0, 1 - along * along)), from = std::hypot(at.x(), at.y());
+        if (from > 0) at << across / from * at.x() * radius, across / from * at.y() * radius, along * radius;
+    }
+    return {x, mesh.triangles()};
+}
+
 template <membrane::Real Scalar>
 Surface<Scalar> surface_of(const membrane::TriangleMesh<Scalar>& mesh) {
     return {mesh.positions(), mesh.triangles()};

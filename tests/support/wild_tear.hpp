@@ -53,7 +53,7 @@ struct WildTear {
                {.max_tips = 6, .move_vertices = random.chance(0.8)}),
           solver(sheet, options(static_cast<int>(seed))),
           tree(mesh),
-          tracker(mesh, {.fine_triangles = seed % 2 == 0 ? 0.0 : 1.0}),
+          tracker(mesh, {.fine_triangles = std::array{0.0, 1.0, 0.3, 0.5}[seed % 4]}),  // faces, vertices, both
           grasper(mesh, {.snap_to_vertex = random.chance(0.3),
                          .holding_force = random.number(1e-3, 0.05),
                          .jaw_length = random.number(0.5e-3, 5e-3)}),

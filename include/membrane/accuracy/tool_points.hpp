@@ -119,8 +119,12 @@ inline std::vector<ToolPoint> tool_points(const Triangles& triangles, const Poin
             }
             if (vertices != nullptr && vertices->carry(corners, tool.radius)) continue;
             for (int feature = 0; feature < feature_pairs(tool); ++feature) {
-                const auto point = contact_point(f, corners, triangle, tool, feature, tool.radius);
-                if (point && !point->normal.isZero(0) && point->gap <= max_distance) points.push_back({*point, i});
+                auto point = contact_point(f, corners, triangle, tool, feature, tool.radius);
+                if (!point || point->normal.isZero(0)) continue;
+                if (vertices != nullptr)
+                    point->lift = vertices->lift(corners, triangle, point->weights, tool.axis, tool.radius);
+                point->gap -= point->lift;
+                if (point->gap <= max_distance) points.push_back({*point, i});
             }
         }
     }

@@ -19,10 +19,37 @@
 ///     }
 namespace membrane {
 
+/// How far outside a tool a point of a face stays [m], for one face or several; negative where the face may cut in. By
+/// roundness and lifts of the corners, see `ContactVertices`, and the direction of a shaft. A surface through the
+/// corners that is as round as the tool lies outside the face by p / (2 radius): p is the product of the distances of
+/// the point from both ends of a chord of the circumcircle, the sum over the sides of weight times weight times squared
+/// length. A shaft is round across its axis only.
+template <Number N>
+[[nodiscard]] MEMBRANE_INLINE N face_lift(const Triangle<N>& triangle, const Vector3<N>& weights,
+                                          const Vector3<N>& roundness, const Vector3<N>& lifts,
+                                          const Vector3<Each<N>>& along, Each<N> radius) noexcept {
+    const Vector3<N> axis = along.template cast<N>();
+    const auto square = [&](const Vector3<N>& side) {
+        const N part = dot(side, axis);
+        return squared_norm(side) - part * part;
+    };
+    const N product = weights[0] * weights[1] * square(triangle.b - triangle.a) +
+                      weights[1] * weights[2] * square(triangle.c - triangle.b) +
+                      weights[2] * weights[0] * square(triangle.a - triangle.c);
+    const N inside = product / (2 * radius);
+    N sum = 0;
+    for (Eigen::Index k = 0; k < 3; ++k) sum += weights[k] * roundness[k] * (lifts[k] - inside);
+    return sum;
+}
+
 /// On a fine mesh the vertices stay outside the tool, and the faces between them cut into it. A smooth surface through
 /// the vertices of a face cuts in less than the face: it touches a tool of radius R, for faces of circumradius c, where
 /// the vertices stay sqrt(R^2 + w c^2) from the axis. If the vertices touched the tool, w = 0, a membrane on a
 /// foundation would push too little; with w = 1 the faces would touch it, and hold the membrane too far out.
+///
+/// A vertex beside larger triangles does not carry the contact; the faces there do, lifted as far as the vertices would
+/// lift them (`face_lift`). The lift fades up to twice the size of `fine` triangles: on a graded mesh the force does
+/// not jump where faces take over.
 ///
 /// Lengths are those of the mesh at rest, in double: what is fine does not change as the membrane stretches.
 class ContactVertices {
@@ -66,6 +93,17 @@ class ContactVertices {
         return any() ? above(radius, fine_ * fine_ * radius * radius) : 0;
     }
     ///@}
+
+    /// 1 for a vertex that carries the contact, 0 where the triangles around it are larger by a factor of two.
+    [[nodiscard]] double roundness(Index v, double radius) const noexcept {
+        return std::clamp(2 - std::sqrt(squares_[at(v)].largest) / (fine_ * radius), 0.0, 1.0);
+    }
+
+    /// How far outside a tool of this radius a point of a face stays, `triangle` now; see `face_lift` [m].
+    template <Real Scalar>
+    [[nodiscard]] Scalar lift(const std::array<Index, 3>& corners, const Triangle<Scalar>& triangle,
+                              const Vector3<Scalar>& weights, const Vector3<Scalar>& axis,
+                              Scalar radius) const noexcept;
 
   private:
     static constexpr double part = 0.2;  // w
@@ -111,6 +149,19 @@ void ContactVertices::measure(const LocalSurface<Scalar>& surface, const ConstPo
         found.mean += square / static_cast<double>(around.size());
     }
     squares_[at(v)] = found;
+}
+
+template <Real Scalar>
+Scalar ContactVertices::lift(const std::array<Index, 3>& corners, const Triangle<Scalar>& triangle,
+                             const Vector3<Scalar>& weights, const Vector3<Scalar>& axis,
+                             Scalar radius) const noexcept {
+    Vector3<Scalar> round, lifts;
+    for (std::size_t k = 0; any() && k < 3; ++k) {
+        const auto row = static_cast<Eigen::Index>(k);
+        round[row] = static_cast<Scalar>(roundness(corners[k], radius));
+        lifts[row] = static_cast<Scalar>(lift(corners[k], radius));
+    }
+    return any() ? face_lift(triangle, weights, round, lifts, direction_or_zero(axis), radius) : Scalar(0);
 }
 
 }  // namespace membrane

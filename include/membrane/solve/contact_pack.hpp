@@ -67,9 +67,12 @@ struct alignas(32) ContactPack {
     Load load;      ///< by the last pass
     Load applied;   ///< included in the rows of forces
     Wide distance;  ///< of the tool's axis from the points, along their normals [m]
-    Wide lift;      ///< of vertices that carry the contact, see `ContactPoint::lift` [m]
-    Wide wall;      ///< of such vertices: how far along the normal they may go [m]
-    Wide change;    ///< of the forces in the last pass [N]
+    ///@{
+    /// Of the corners, see `face_lift` [1], [m]; of a vertex that carries the contact, its lift.
+    Vector3<Wide> roundness, lift;
+    ///@}
+    Wide wall;    ///< of such vertices: how far along the normal they may go [m]
+    Wide change;  ///< of the forces in the last pass [N]
 
     Vector3<Wide> free;  ///< 1 for a corner that may move
     Wide side;           ///< of the points, see `ContactPoint::side`
@@ -84,6 +87,7 @@ struct alignas(32) ContactPack {
     bool on_fixed = false;                           ///< whether a corner of a point is fixed or shared
     bool has_walls = false;                          ///< whether updates of its vertices find the forces
     bool has_sides = false;                          ///< whether the side of a point is known
+    bool is_lifted = false;                          ///< whether a corner of a face is round
     bool acts = true;  ///< whether a point pressed or penetrated in the last pass over all packs
 };
 
@@ -144,8 +148,8 @@ void ContactPacks<Scalar>::begin_pack(ContactKind kind) noexcept {
     const Vector3<Lanes<Scalar>> none(0, 0, 0);
     pack.load = {{1, 0, 0}, none, 0, none};  // unused lanes have valid numbers
     pack.applied = {none, none, 0, none};
-    pack.free = none;
-    pack.distance = pack.lift = pack.wall = pack.change = pack.side = pack.end = pack.listed = pack.used = Scalar(0);
+    pack.free = pack.roundness = pack.lift = none;
+    pack.distance = pack.wall = pack.change = pack.side = pack.end = pack.listed = pack.used = Scalar(0);
     for (auto& begins : pack.corner) begins.fill(unused_row_);
     pack.point.fill(no_index);
     pack.turn.fill(0);
@@ -168,7 +172,7 @@ void ContactPacks<Scalar>::add_lane(ContactPack<Scalar>& pack, const ContactPoin
     }
     for (Eigen::Index k = 0; k < 3; ++k) pack.load.normal[k].set(i, point.normal[k]);
     pack.load.force.set(i, norm(point.force));
-    pack.lift.set(i, point.lift);
+    pack.lift[0].set(i, point.lift);
     pack.end.set(i, point.feature == 1 ? Scalar(1) : Scalar(0));
     pack.side.set(i, point.side);
     pack.has_sides = pack.has_sides || point.side != 0;

@@ -228,8 +228,11 @@ MEMBRANE_INLINE void place_wall(VertexRows<Scalar>& rows, ContactPack<Scalar>& p
 
 template <Real Scalar>
 void ContactState<Scalar>::place_walls(VertexRows<Scalar>& rows) noexcept {
+    rows.only_walls = true;
     for (auto& pack : packs.items()) {
-        if (pack.kind == ContactKind::vertex && !pack.on_fixed) place_wall(rows, pack);
+        const bool is_wall = pack.kind == ContactKind::vertex && !pack.on_fixed;
+        if (is_wall) place_wall(rows, pack);
+        rows.only_walls = rows.only_walls && is_wall;
     }
 }
 

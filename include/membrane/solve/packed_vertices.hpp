@@ -196,7 +196,8 @@ class PackedVertices {
         VertexForce<Wide> others;
         bool has_walls = false;
     };
-    // Of vertices with a wall: of 1 to 1.7 it leaves the least error of the force after few updates.
+    // Of vertices with a wall: of 1 to 1.7 it leaves the least error of the force after few updates. Beside faces in
+    // contact, whose passes move the same vertices, updates might not converge.
     static constexpr Scalar over_relaxation = Scalar(1.4);
     template <class Rule, class Scene>
     [[nodiscard]] PackState evaluate(std::size_t p, const Scene& scene, Constrained constrained) const noexcept;
@@ -511,7 +512,7 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene
             at.vertex.contact_stiffness = contact_stiffness;
             at.vertex.contact_normal = direction_or_zero<Wide>(of_constraints.point);
             at.has_walls = rows.has_walls && any(squared_norm(gather(rows.wall.data(), own.data())) > 0);
-            if (at.has_walls && is_descent_rule<Rule>) at.vertex.over_relaxation = over_relaxation;
+            if (at.has_walls && rows.only_walls && is_descent_rule<Rule>) at.vertex.over_relaxation = over_relaxation;
         }
     }
     at.vertex.force += at.others.force;

@@ -684,17 +684,17 @@ template <class Scene>
 bool QuasiStaticSolver<Scalar, Rule>::evaluate_residuals(const Scene& scene) noexcept {
     const bool constrained = !rows_.forced.items().empty() || !rows_.prescribed.items().empty();
     const Scalar largest = detail::too_large<Scalar> / (constrained ? 100 : 1);
-    Scalar squares = 0, most = 0, most_in_queue = 0;  // of forces [N^2]
+    Scalar squares = 0, largest_square = 0, square_in_queue = 0;  // of forces [N^2]
     const auto count = [&](Index v) {
         const Vector3<Scalar> force = rows_.residual_force(v);
         const Scalar square = squared_norm(force);
         ++report_.vertex_updates;
         if (!rows_.is_fixed(v)) {
-            most = (std::max)(most, square);
-            if (active_.queue().contains(v)) most_in_queue = (std::max)(most_in_queue, square);
+            largest_square = (std::max)(largest_square, square);
+            if (active_.queue().contains(v)) square_in_queue = (std::max)(square_in_queue, square);
         }
-        squares += square + squared_norm<Scalar>(force - rows_.constraint_force(v)) +
-                   squared_norm(rows_.position_of(v));
+        squares +=
+            square + squared_norm<Scalar>(force - rows_.constraint_force(v)) + squared_norm(rows_.position_of(v));
     };
     const auto evaluate = [&](Index v) {
         const Vector3<Scalar> force = total_force(scene, v).force;
@@ -714,8 +714,8 @@ bool QuasiStaticSolver<Scalar, Rule>::evaluate_residuals(const Scene& scene) noe
         }
     }
     for (const Index v : prescribed.items()) evaluate(v);  // in packs or not
-    report_.residual = std::sqrt(most);
-    progress_.queue_residual = std::sqrt(most_in_queue);
+    report_.residual = std::sqrt(largest_square);
+    progress_.queue_residual = std::sqrt(square_in_queue);
     return is_finite(squares) && squares < largest * largest;
 }
 

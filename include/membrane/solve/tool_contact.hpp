@@ -66,11 +66,12 @@ struct ToolContact {
     bool seed(Context& context) const noexcept;
     void list_candidates(Context& context) const noexcept;
     void carry_with_tool(Context& context) const noexcept;
-    void clear_contact_point(Context& context) const noexcept;
+    void clear_contact_point(Context& context, Scalar lift) const noexcept;
     void find_points(Context& context) const noexcept;
     void add_point(Context& context, ContactPoint<Scalar> point) const noexcept;
     void stay_on_side(const Context& context, ContactPoint<Scalar>& point) const noexcept;
     void pack_points(Context& context) const noexcept;
+    void lift_faces(ContactPack<Scalar>& pack) const noexcept;
     [[nodiscard]] std::optional<Vector3<Scalar>> direction_out_of_support(const Context& context) const noexcept;
     void touch_support(Context& context, const Vector3<Scalar>& out) const noexcept;
     [[nodiscard]] bool comes_out(const Triangle<Scalar>& before, const Triangle<Scalar>& now) const noexcept;
@@ -82,6 +83,13 @@ struct ToolContact {
     }
     [[nodiscard]] ToolShape<Scalar> shape() const noexcept {
         return {tool.position, tool.axis, contact.patch.axis_point, contact.patch.radius};
+    }
+    // The least gap of a point of a face, see `ContactVertices`.
+    [[nodiscard]] Scalar lift_at(const Context& context, const Corners& corners,
+                                 const Vector3<Scalar>& weights) const noexcept {
+        const auto* const carriers = contact.patch.vertices;
+        if (carriers == nullptr) return 0;
+        return carriers->lift(corners, triangle_of(context, corners), weights, tool.axis, contact.patch.radius);
     }
     [[nodiscard]] static auto packs(Context& context) noexcept {
         return context.step().contacts.pack_ranges[context.constraint()].of(context.step().contacts.packs.items());
@@ -164,8 +172,10 @@ void ToolContact<Scalar>::begin(Context& context) const noexcept {
     const auto* const carriers = contact.patch.vertices;
     const bool by_vertices = carriers != nullptr && carriers->carry(contact.corners, contact.patch.radius);
     const bool held = by_vertices || is_on_fixed(context, contact.corners);  // these penetrate at equilibrium, too
-    if (!contact.patch.tunnelled && !out && !held && contact.gap < -negligible_distance(context, contact.corners[0])) {
-        clear_contact_point(context);
+    const Scalar lift = lift_at(context, contact.corners, contact.barycentric);
+    if (!contact.patch.tunnelled && !out && !held &&
+        contact.gap < lift - negligible_distance(context, contact.corners[0])) {
+        clear_contact_point(context, lift);
     }
     out ? touch_support(context, *out) : find_points(context);
     if (step.refusal() != StepStatus::advanced) return;
@@ -237,9 +247,9 @@ void ToolContact<Scalar>::carry_with_tool(Context& context) const noexcept {
 
 // If the contact point penetrates, moves the surface there until it just touches the tool.
 template <Real Scalar>
-void ToolContact<Scalar>::clear_contact_point(Context& context) const noexcept {
+void ToolContact<Scalar>::clear_contact_point(Context& context, Scalar lift) const noexcept {
     const Vector3<Scalar> now = point_at(surface_triangle(context, contact.corners), contact.barycentric);
-    const Vector3<Scalar> by = contact.patch.axis_point - contact.patch.radius * contact.normal - now;
+    const Vector3<Scalar> by = contact.patch.axis_point - (contact.patch.radius + lift) * contact.normal - now;
     if (dot(by, contact.normal) < 0) press_in<Scalar>(context, contact.corners, contact.barycentric, by);
 }
 
@@ -318,6 +328,24 @@ void ToolContact<Scalar>::pack_points(Context& context) const noexcept {
     contacts.packs.append(std::span<const ContactPoint<Scalar>>(points),
                           contacts.point_ranges[context.constraint()].begin, [&](Index v) { return context.fixed(v); });
     range.end = contacts.packs.size();
+    if (contact.patch.vertices == nullptr) return;
+    for (auto& pack : packs(context)) {
+        if (pack.kind != ContactKind::vertex) lift_faces(pack);
+    }
+}
+
+template <Real Scalar>
+void ToolContact<Scalar>::lift_faces(ContactPack<Scalar>& pack) const noexcept {
+    const auto& carriers = *contact.patch.vertices;
+    for (std::size_t i = 0; i < pack.size; ++i) {
+        for (std::size_t k = 0; k < 3; ++k) {
+            const Index v = row_at(pack.corner[k][i]);
+            const auto roundness = static_cast<Scalar>(carriers.roundness(v, contact.patch.radius));
+            pack.roundness[static_cast<Eigen::Index>(k)].set(i, roundness);
+            pack.lift[static_cast<Eigen::Index>(k)].set(i, static_cast<Scalar>(carriers.lift(v, contact.patch.radius)));
+            pack.is_lifted = pack.is_lifted || roundness > 0;
+        }
+    }
 }
 
 // Fixed vertices do not yield to a tool: if it penetrates by more than its radius, its axis is behind them. Then the
@@ -439,7 +467,9 @@ bool ToolContact<Scalar>::has_new_overlap(const Context& context) const noexcept
             }
             const auto nearest = closest_points(surface_triangle(context, listed.corners), tool, feature);
             const Scalar slack = negligible_distance(context, listed.corners[0]);
-            if (nearest && norm(nearest->separation) < contact.patch.radius - slack) return true;
+            if (!nearest) continue;
+            const Scalar lift = lift_at(context, listed.corners, nearest->barycentric);
+            if (norm(nearest->separation) < contact.patch.radius + lift - slack) return true;
         }
     }
     return false;

@@ -173,6 +173,7 @@ struct VertexRows {
     std::vector<Scalar> external_force;   ///< sum of the sizes of forces given in this step, as by `PointLoad` [N]
     bool has_external_forces = false;     ///< in this step
     bool has_walls = false;               ///< in this step
+    bool only_walls = false;              ///< in this step: no contact has forces that its updates do not find
 
     ///@{
     /// Vertices whose positions are loaded, that are seeds, that constraints prescribe, or on which their forces act.
