@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <span>
@@ -85,7 +86,8 @@ struct WildTear {
         const auto contact = tracker.update(tree, x, tool);
         const auto grasp = grasper.update(contact, x, tool);
         grasps = grasp.holding();
-        grasps_surface = !grasps || grasp.corners == tear.surface().corners(grasp.triangle);
+        const auto corners = grasps ? tear.surface().corners(grasp.triangle) : grasp.corners;  // in any order
+        grasps_surface = std::is_permutation(corners.begin(), corners.end(), grasp.corners.begin());
         const auto pressing = friction.press(tool, contact, grasp);
         const auto grasping = pull(tool, grasp);
         const auto pulling = membrane::pull(held, pulled);

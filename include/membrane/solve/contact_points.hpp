@@ -421,6 +421,7 @@ template <std::size_t corners, Real Scalar>
 [[nodiscard]] bool push_out(VertexRows<Scalar>& rows, ContactState<Scalar>& contacts, const ToolShape<Scalar>& tool,
                             ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
+    if (pack.has_walls) return false;  // their forces are applied along the normals so far
     auto now = located_pack<corners>(rows, contacts, tool, pack);
     const auto inside = (pack.used > 0) & (-now.gap > gap_tolerance(rows, now, pack));
     if (!any(inside) || (corners == 1 && !pack.on_fixed)) return false;  // the updates move vertices out

@@ -218,6 +218,7 @@ void ContactState<Scalar>::find_shared() noexcept {
 template <Real Scalar>
 MEMBRANE_INLINE void place_wall(VertexRows<Scalar>& rows, ContactPack<Scalar>& pack) noexcept {
     pack.has_walls = !pack.on_fixed;
+    pack.applied.normal = pack.load.normal;  // of the force that updates will apply
     rows.has_walls = rows.has_walls || pack.has_walls;
     const Lanes<Scalar> exists = pack.has_walls ? pack.used : Lanes<Scalar>(0);
     scatter_padded<Scalar>({exists * pack.load.normal, pack.wall}, rows.wall.data(), pack.corner[0].data());
