@@ -119,17 +119,14 @@ class PackedVertices {
     };
 
     /// Updates the vertices of packs `begin` to `end`, the end excluded, all of one group, by `rule`. The packs are
-    /// divided among threads; a thread interleaves two packs, which hides the latency of roots and divisions.
+    /// divided among threads.
     template <class Scene, class Rule, Executor E>
     void update(std::size_t begin, std::size_t end, const Scene& scene, const Rule& rule, Constrained constrained,
                 const E& executor) noexcept {
         constexpr std::size_t packs_in_task = 32;
         parallel_for(executor, end - begin, packs_in_task, [&](std::size_t first, std::size_t last) {
-            std::size_t p = begin + first;
-            if constexpr (!HasElements<NetworkOf<Scene>>) {
-                for (; p + 1 < begin + last; p += 2) update_two(p, scene, rule, constrained);
-            }
-            for (; p < begin + last; ++p) outcomes_[p] = update_pack(p, scene, rule, constrained);
+            for (std::size_t p = begin + first; p < begin + last; ++p)
+                outcomes_[p] = update_pack(p, scene, rule, constrained);
         });
     }
     /// Outcome of the last `update` for pack `p`.
@@ -202,16 +199,8 @@ class PackedVertices {
     template <class Rule, class Scene>
     [[nodiscard]] PackState evaluate(std::size_t p, const Scene& scene, Constrained constrained) const noexcept;
     template <class Scene, class Rule>
-    MEMBRANE_FLATTEN Outcome update_pack(std::size_t p, const Scene& scene, const Rule& rule,
-                                         Constrained constrained) noexcept {
+    Outcome update_pack(std::size_t p, const Scene& scene, const Rule& rule, Constrained constrained) noexcept {
         return move(p, evaluate<Rule>(p, scene, constrained), scene, rule);
-    }
-    template <class Scene, class Rule>
-    MEMBRANE_FLATTEN void update_two(std::size_t p, const Scene& scene, const Rule& rule,
-                                     Constrained constrained) noexcept {
-        const auto state = evaluate<Rule>(p, scene, constrained), next = evaluate<Rule>(p + 1, scene, constrained);
-        outcomes_[p] = move(p, state, scene, rule);
-        outcomes_[p + 1] = move(p + 1, next, scene, rule);
     }
     template <class Scene, class Rule>
     Outcome move(std::size_t p, PackState at, const Scene& scene, const Rule& rule) noexcept;
