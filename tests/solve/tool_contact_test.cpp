@@ -55,6 +55,7 @@ struct Material {
     double foundation;
     double damping = 0;
     std::vector<Index> pinned = {};
+    double fine_triangles = 0;  // of the trackers
 };
 
 /// A membrane with springs of stiffness 1 and all that a loop with two tools needs.
@@ -69,7 +70,7 @@ class LoopOf {
                       {.stiffness = static_cast<S>(material.foundation), .damping = static_cast<S>(material.damping)}),
           solver_(network_, options),
           tree_(mesh),
-          trackers_(2, ContactTracker(mesh)),
+          trackers_(2, ContactTracker(mesh, {.fine_triangles = material.fine_triangles})),
           x_(mesh.positions()) {}
 
     /// Presses with one tool or two.
@@ -434,6 +435,13 @@ TEST_CASE("a tool held still keeps depth, contact and force, and its contact beg
         {"tiny tool", {.layers = 5, .sweeps = 4}, {.foundation = 1}, 0.05},
         {"point", {.layers = 5, .sweeps = 4}, {.foundation = 1}, 0},
         {"large tool", {.layers = 8, .sweeps = 4}, {.foundation = 3}, 3},
+        {"large tool, by vertices", {.layers = 8, .sweeps = 4}, {.foundation = 3, .fine_triangles = 0.5}, 3},
+        {"by vertices, one sweep, damped, at once",
+         {.layers = 8, .sweeps = 1},
+         {.foundation = 1, .damping = 0.05, .fine_triangles = 0.5},
+         2,
+         {0, 0, 0},
+         {0, 0, 2}},
         {"sideways", {.layers = 6, .sweeps = 4}, {.foundation = 0.5}, 0.5, {0, 0, 0}, {0.01, 0.005, 0.001}},
         {"upright shaft", {.layers = 6, .sweeps = 4}, {.foundation = 0.5, .damping = 0.01}, 0.3, {0.1, 0.2, 1}},
         {"lying shaft", {.layers = 6, .sweeps = 4}, {.foundation = 0.5}, 0.3, {0.5, 0.2, 0.05}, {0, 0, 0.003}},

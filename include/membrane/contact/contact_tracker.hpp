@@ -405,19 +405,24 @@ bool ContactTracker<Scalar>::find(const Scene& scene, Contact<Scalar>& contact) 
     return true;
 }
 
-// Whether the contact begins or goes on.
+// Whether the contact begins or goes on. Vertices that carry it stay lifted off the tool until it lets go of them: then
+// the tool may be outside of the surface at rest, too.
 template <Real Scalar>
 bool ContactTracker<Scalar>::contacts(const Scene& scene, Contact<Scalar>& contact) noexcept {
-    const bool by_vertices = vertices_.carry(contact.corners, scene.radius);
-    const Scalar lift = by_vertices ? static_cast<Scalar>(vertices_.lift(contact.corners[0], scene.radius)) : Scalar(0);
+    const auto triangle = surface_.triangle(scene.x, contact.triangle);
+    const Scalar here = vertices_.lift(contact.corners, triangle, contact.barycentric, scene.tool.axis, scene.radius);
+    if (!last_.touching() && contact.gap > here) return false;
+    const auto lift = static_cast<Scalar>(vertices_.largest_lift(contact.corners, scene.radius));
     const Scalar gap = contact.gap - lift;
-    if (!last_.touching() && gap > 0) return false;
     if (gap > 0 && (side_.slid_off() || is_below_border(scene, contact))) return false;
+    contact.depth = -lift;
     const Scalar rebound = measure_depth(scene, contact);
+    const bool is_pressed_in = contact.depth > -lift;
+    contact.depth = (std::max)(Scalar(0), contact.depth);
     if (is_hooked(scene, contact)) return false;
     if (!last_.touching()) return true;
     const Scalar slack = margin_ / 1000;
-    return gap <= slack || (contact.depth > 0 && gap <= rebound + scene.travel);
+    return gap <= slack || (is_pressed_in && gap <= rebound + scene.travel);
 }
 
 // Whether an end of the tool has passed through the surface since the last tick.
@@ -735,9 +740,9 @@ void ContactTracker<Scalar>::collect_candidates(int rings) noexcept {
     }
 }
 
-// Measures the depth to the nearest triangle of the rest surface. Beyond the middle of a body that triangle is on the
-// opposite wall; then to the nearest one that faces as the wall where the tool entered. Returns the largest gap of a
-// membrane that springs back [m]: it does not go past the nearest triangle.
+// Raises the depth to that below the nearest triangle of the rest surface. Beyond the middle of a body that triangle is
+// on the opposite wall; then to the nearest one that faces as the wall where the tool entered. Returns the largest gap
+// of a membrane that springs back [m]: it does not go past the nearest triangle.
 template <Real Scalar>
 Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept {
     const std::array<Vector3<Scalar>, 3> probes{scene.tool.position, scene.tool.position + scene.tool.axis,
@@ -752,7 +757,6 @@ Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>
     const auto nearby = near_.items();
     bool beyond = false;
     Scalar rebound = 0;
-    contact.depth = 0;
     for (std::size_t i = 0; i < (is_shaft(scene.tool) ? 3U : 1U); ++i) {
         const Index start = origin_triangles_[i] == no_index ? contact.triangle : origin_triangles_[i];
         Index& f = origin_triangles_[i] = at_rest().walk_to_closest(scene.anchors, start, probes[i]);

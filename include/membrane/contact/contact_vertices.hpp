@@ -87,8 +87,15 @@ class ContactVertices {
     ///@}
 
     ///@{
-    /// How far outside a tool of this radius `v` stays, and at most any that carries the contact [m].
+    /// How far outside a tool of this radius `v` stays; at most any of these corners, by as much as the contact is
+    /// theirs; at most any that carries the contact [m].
     [[nodiscard]] double lift(Index v, double radius) const noexcept { return above(radius, squares_[at(v)].mean); }
+    [[nodiscard]] double largest_lift(const std::array<Index, 3>& corners, double radius) const noexcept {
+        double largest = 0;
+        for (std::size_t k = 0; any() && k < 3; ++k)
+            largest = (std::max)(largest, roundness(corners[k], radius) * lift(corners[k], radius));
+        return largest;
+    }
     [[nodiscard]] double largest_lift(double radius) const noexcept {
         return any() ? above(radius, fine_ * fine_ * radius * radius) : 0;
     }
