@@ -418,11 +418,13 @@ TEST_CASE("equilibrium agrees with the quasi-static solver", "[equilibrium]") {
         const auto load_of = [&](double size) {
             return load<double>(sphere.corners(random.index(320)), random.barycentric(), size * random.vector());
         };
-        check_solver(sphere, sphere.x(), pull(v, beside(v)), pull(pinned, beside(v)));
         check_solver(sphere, sphere.x(), pull(v, beside(v)), pull(v, beside(v)));
-        check_solver(sphere, sphere.x(), pull(forceps, grasp));
-        check_solver(sphere, sphere.x(), load_of(0.1), load_of(0.2));
-        check_solver(sphere, sphere.x(), pin(pins), load_of(0.2));
+        if (in_full()) {
+            check_solver(sphere, sphere.x(), pull(v, beside(v)), pull(pinned, beside(v)));
+            check_solver(sphere, sphere.x(), pull(forceps, grasp));
+            check_solver(sphere, sphere.x(), load_of(0.1), load_of(0.2));
+            check_solver(sphere, sphere.x(), pin(pins), load_of(0.2));
+        }
         check_solver(sphere, sphere.x(), pin(pins), load_of(0.1), pull(forceps, grasp), pull(forceps, {}));
     }
 }

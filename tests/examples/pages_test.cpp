@@ -721,23 +721,23 @@ TEST_CASE("pages: a mesh from a file") {
 
 TEST_CASE("pages: meshes from formulas") {
     // [distmesh]
-    const auto lens = membrane::distmesh(membrane::Ellipsoid{.radii = {4.5e-3, 4.5e-3, 2e-3}}, {.edge_length = 1e-3});
+    const auto lens = membrane::distmesh(membrane::Ellipsoid{.radii = {4.5e-3, 4.5e-3, 2e-3}}, {.edge_length = 2e-3});
     const auto front = membrane::trimmed(membrane::Ball{.radius = 8e-3}, membrane::HalfSpace{.point = {0, 0, -5e-3}});
-    const auto cornea = membrane::distmesh(front, {.edge_length = 1.2e-3});  // with a border
-    const auto torus = [](const Eigen::Vector3d& p) {                        // or any function of your own
+    const auto cornea = membrane::distmesh(front, {.edge_length = 2e-3});  // with a border
+    const auto torus = [](const Eigen::Vector3d& p) {                      // or any function of your own
         return std::hypot(std::hypot(p.x(), p.y()) - 6e-3, p.z()) - 2e-3;
     };
     const auto ring = membrane::distmesh(
-        torus, {.edge_length = 1.2e-3, .bounds = membrane::Bounds{{-0.01, -0.01, -0.003}, {0.01, 0.01, 0.003}}});
+        torus, {.edge_length = 2e-3, .bounds = membrane::Bounds{{-0.01, -0.01, -0.003}, {0.01, 0.01, 0.003}}});
     // [/distmesh]
     // [graded]
-    const auto length = membrane::graded_edge_length({.longest = 1.2e-3,
-                                                      .loads = {{.centre = {0, 0, 8e-3}, .radius = 0.5e-3}},
+    const auto length = membrane::graded_edge_length({.longest = 2e-3,
+                                                      .loads = {{.centre = {0, 0, 8e-3}, .radius = 1.5e-3}},
                                                       .tension = 1.8,       // [N/m]
-                                                      .foundation = 2e7});  // [Pa/m]
+                                                      .foundation = 2e6});  // [Pa/m]
     const auto graded = membrane::distmesh(membrane::Ball{.radius = 8e-3}, {.edge_length = length});
     // [/graded]
-    CHECK(membrane::mean_edge(graded) < 1.2e-3);
+    CHECK(membrane::mean_edge(graded) < 2e-3);
     CHECK(membrane::validate(lens).facts.closed());
     CHECK(membrane::validate(cornea).facts.borders == 1);
     CHECK(membrane::validate(ring).facts.genus == 1);

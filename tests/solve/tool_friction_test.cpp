@@ -159,6 +159,7 @@ TEMPLATE_TEST_CASE("a tool slips at the coefficient times the normal force, and 
     for (const auto& [coefficient, is_flat] :
          {std::pair{0.1, false}, {0.3, false}, {1.0, false}, {0.1, true}, {0.3, true}, {1.0, true}}) {
         CAPTURE(coefficient, is_flat);
+        if (!in_full() && (coefficient == 0.3) == is_flat) continue;
         Settings settings{.friction = coefficient, .rings = 20};
         if (is_flat) settings.radius = 5e-3, settings.stretch = 1.02;
         Drag<TestType> drag(settings);
@@ -247,7 +248,7 @@ TEMPLATE_TEST_CASE("under a tool at rest the membrane does not creep", "[frictio
                                    Settings{.friction = 1.0, .sweeps = 20, .stretch = 1.1},
                                    Settings{.friction = 1.0, .sweeps = 20, .radius = 20e-3, .stretch = 1.2});
     CAPTURE(settings.friction, settings.sweeps, settings.radius);
-    if (cases_are_slow && settings.radius > 10e-3) return;  // a minute
+    if (!in_full() && (settings.sweeps > 5 || settings.friction == 0.1)) return;
     Drag<TestType> drag(settings);
     drag.press_in();
     for (int i = 1; i <= 30; ++i) drag.move_to({1e-6 * i, 0, 0});
@@ -296,6 +297,7 @@ TEMPLATE_TEST_CASE("what the hand gives is stored in membrane and foundation, or
                    TEST_SCALARS) {
     const double coefficient = GENERATE(0.1, 0.3, 0.6);
     CAPTURE(coefficient);
+    if (!in_full() && coefficient != 0.3) return;
     Drag<TestType> drag({.friction = coefficient, .rings = 20});
     double work = 0;
     Vector3<double> last = Vector3<double>::Zero(), at = drag.tool.position.template cast<double>();

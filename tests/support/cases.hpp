@@ -27,5 +27,5 @@ inline int cases(int usual, int in_long_run) {
     const long long all = (std::max)(1LL, std::atoll(times)) * in_long_run;
     return static_cast<int>((std::min)(all, static_cast<long long>(std::numeric_limits<int>::max())));
 }
-/// All of `most` in a long run, a fifth otherwise; a twentieth where each case is slow.
-inline int cases(int most) { return cases(cases_are_slow ? most : (std::max)(1, most / 5), most); }
+/// All of `most` in a long run, an eighth otherwise; a twentieth where each case is slow.
+inline int cases(int most) { return cases(cases_are_slow ? most : (std::max)(1, most / 8), most); }

@@ -14,8 +14,8 @@ inline auto ContainsSubstring(const std::string& text) { return Catch::Matchers:
 #endif
 
 // For `TEMPLATE_TEST_CASE("...", "[...]", TEST_SCALARS)`. Where float differs from double by more than roundings, as in
-// lanes and ranges, a test names both itself.
-#ifdef MEMBRANE_TEST_FLOAT
+// lanes and ranges, a test names both itself. With that macro a test of many laws, rules or elements takes all of them.
+#ifdef MEMBRANE_TEST_ALL_TYPES
 #define TEST_SCALARS double, float
 #else
 #define TEST_SCALARS double

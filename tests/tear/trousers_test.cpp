@@ -13,7 +13,7 @@
 // The mean force of legs that stretch by 5 % depends less on the grid.
 TEMPLATE_TEST_CASE("a strip that is torn like trousers takes the force of the closed form, on any mesh and grid",
                    "[tear]", TEST_SCALARS) {
-    const int directions = cases(2, 20);
+    const int directions = cases(1, 20);
     const bool is_long = directions >= 20;
     const std::vector<int> widths = is_long && std::is_same_v<TestType, double> ? std::vector{4, 6, 8} : std::vector{4};
     const int edges = cases_are_slow ? 4 : is_long ? 20 : 6;
@@ -22,7 +22,7 @@ TEMPLATE_TEST_CASE("a strip that is torn like trousers takes the force of the cl
         double mean = 0, least = 10, largest = 0;
         for (const int width : widths) {
             for (int i = 0; i < directions; ++i) {
-                const double turn = 60.0 * i / (is_long ? directions - 1 : directions);
+                const double turn = is_long ? 60.0 * i / (directions - 1) : 25;
                 const auto found = test::tear_trousers<TestType>({.width = width,
                                                                   .turn = turn * std::numbers::pi / 180,
                                                                   .strain = strain,
