@@ -18,7 +18,7 @@ endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
     string(APPEND CMAKE_CXX_FLAGS " --param=ggc-min-expand=100 --param=ggc-min-heapsize=1000000")
     if(MEMBRANE_USUAL_TYPES)  # a tenth less again, for what tests gain little from
-        target_compile_options(membrane_warnings INTERFACE -w)  # looking for what is to warn of is as much
+        target_compile_options(membrane_warnings INTERFACE -w)  # a tenth, too
         foreach(pass tree-pta tree-dominator-opts ivopts if-conversion if-conversion2 shrink-wrap tree-sink tree-slsr
                 tree-bit-ccp branch-count-reg reorder-blocks cprop-registers split-wide-types)
             string(APPEND CMAKE_CXX_FLAGS " -fno-${pass}")

@@ -26,8 +26,8 @@ tests = root / "tests"
 scratch = root / "build/mutants"
 
 # As many cases as without asserts, and yet an index out of range ends the program.
-flags = ["-std=c++20", "-O1", "-DNDEBUG", "-DMEMBRANE_TEST_ALL_TYPES", "-ffp-contract=off", "-w", "-D_GLIBCXX_ASSERTIONS",
-         "-fsanitize=array-bounds", "-fsanitize-trap=array-bounds",
+flags = ["-std=c++20", "-O1", "-DNDEBUG", "-DMEMBRANE_TEST_ALL_TYPES", "-ffp-contract=off", "-w",
+         "-D_GLIBCXX_ASSERTIONS", "-fsanitize=array-bounds", "-fsanitize-trap=array-bounds",
          "-Deigen_assert(holds)=((holds) ? void() : __builtin_trap())"]
 includes = [f"-I{root}/include", f"-I{tests}", f"-I{root}/examples", f"-I{tests}/support/hd_double",
             "-isystem", "/usr/include/eigen3", f'-DMEMBRANE_TEST_DATA="{tests}/data"']

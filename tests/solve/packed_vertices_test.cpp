@@ -324,31 +324,26 @@ void check_same_shared_out(const Rule& rule) {
 }  // namespace
 
 TEMPLATE_TEST_CASE("whatever does not take lanes, and what exceeds the capacity for packs, ends in the same bits",
-                   "[packed]", TEST_SCALARS){
-#ifndef MEMBRANE_TEST_ALL_TYPES
-    SECTION("block, over-relaxed"){check_same<TestType>(LinearSpring{}, BlockStep{.omega = 1.3});
-}
-#else
-    SECTION("block, over-relaxed"){check_same<TestType, true>(LinearSpring{}, BlockStep{.omega = 1.3});
-}
-SECTION("safe") { check_same<TestType>(LinearSpring{}, SafeStep{}); }
-SECTION("as published") { check_same<TestType>(LinearSpring{}, MassStep{}); }
-SECTION("springs that stiffen, block") { check_same<TestType>(test::CubicSpring{}, BlockStep{}); }
-#endif
+                   "[packed]", TEST_SCALARS) {
+    SECTION("block, over-relaxed") { check_same<TestType, all_types>(LinearSpring{}, BlockStep{.omega = 1.3}); }
+    if constexpr (all_types) {
+        SECTION("safe") { check_same<TestType>(LinearSpring{}, SafeStep{}); }
+        SECTION("as published") { check_same<TestType>(LinearSpring{}, MassStep{}); }
+        SECTION("springs that stiffen, block") { check_same<TestType>(test::CubicSpring{}, BlockStep{}); }
+    }
 }
 
 TEMPLATE_TEST_CASE("elements that do not take lanes end in the same bits", "[packed][tissue]", TEST_SCALARS) {
     check_same_tissue<TestType>(BlockStep{.omega = 1.7});
 }
 
-TEMPLATE_TEST_CASE("an update of a pack is that of each of its vertices alone, to the bit", "[packed]", TEST_SCALARS){
-    SECTION("linear springs, block"){check_alone<TestType>(LinearSpring{}, BlockStep{.omega = 1.3});
-}
-SECTION("springs that stiffen, safe") { check_alone<TestType>(ExponentialSpring{}, SafeStep{}); }
-#ifdef MEMBRANE_TEST_ALL_TYPES
-SECTION("linear springs, safe") { check_alone<TestType>(LinearSpring{}, SafeStep{}); }
-SECTION("springs that stiffen, block") { check_alone<TestType>(test::CubicSpring{}, BlockStep{}); }
-#endif
+TEMPLATE_TEST_CASE("an update of a pack is that of each of its vertices alone, to the bit", "[packed]", TEST_SCALARS) {
+    SECTION("linear springs, block") { check_alone<TestType>(LinearSpring{}, BlockStep{.omega = 1.3}); }
+    SECTION("springs that stiffen, safe") { check_alone<TestType>(ExponentialSpring{}, SafeStep{}); }
+    if constexpr (all_types) {
+        SECTION("linear springs, safe") { check_alone<TestType>(LinearSpring{}, SafeStep{}); }
+        SECTION("springs that stiffen, block") { check_alone<TestType>(test::CubicSpring{}, BlockStep{}); }
+    }
 }
 
 TEMPLATE_TEST_CASE(
@@ -392,12 +387,12 @@ TEMPLATE_TEST_CASE(
 }
 
 TEMPLATE_TEST_CASE("it is all the same in what order an executor does its tasks, or in how many threads", "[packed]",
-                   TEST_SCALARS){SECTION("block"){check_same_shared_out<TestType>(BlockStep{});
-}
-#ifdef MEMBRANE_TEST_ALL_TYPES
-SECTION("safe") { check_same_shared_out<TestType>(SafeStep{}); }
-SECTION("as published") { check_same_shared_out<TestType>(MassStep{}); }
-#endif
+                   TEST_SCALARS) {
+    SECTION("block") { check_same_shared_out<TestType>(BlockStep{}); }
+    if constexpr (all_types) {
+        SECTION("safe") { check_same_shared_out<TestType>(SafeStep{}); }
+        SECTION("as published") { check_same_shared_out<TestType>(MassStep{}); }
+    }
 }
 
 TEMPLATE_TEST_CASE("there are as many groups as the capacity allows, in packs", "[packed]", float, double) {

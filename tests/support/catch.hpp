@@ -14,9 +14,12 @@ inline auto ContainsSubstring(const std::string& text) { return Catch::Matchers:
 #endif
 
 // For `TEMPLATE_TEST_CASE("...", "[...]", TEST_SCALARS)`. Where float differs from double by more than roundings, as in
-// lanes and ranges, a test names both itself. With that macro a test of many laws, rules or elements takes all of them.
+// lanes and ranges, a test names both itself. Tests of many laws, rules or elements take some of them only with
+// `if constexpr (all_types)`.
 #ifdef MEMBRANE_TEST_ALL_TYPES
 #define TEST_SCALARS double, float
+inline constexpr bool all_types = true;
 #else
 #define TEST_SCALARS double
+inline constexpr bool all_types = false;
 #endif

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <initializer_list>
+#include <limits>
 #include <optional>
 #include <span>
 
@@ -415,14 +416,12 @@ bool ContactTracker<Scalar>::contacts(const Scene& scene, Contact<Scalar>& conta
     const auto lift = static_cast<Scalar>(vertices_.largest_lift(contact.corners, scene.radius));
     const Scalar gap = contact.gap - lift;
     if (gap > 0 && (side_.slid_off() || is_below_border(scene, contact))) return false;
-    contact.depth = -lift;
     const Scalar rebound = measure_depth(scene, contact);
-    const bool is_pressed_in = contact.depth > -lift;
+    const bool is_pressed_in = contact.depth + lift > 0;
     contact.depth = (std::max)(Scalar(0), contact.depth);
     if (is_hooked(scene, contact)) return false;
     if (!last_.touching()) return true;
-    const Scalar slack = margin_ / 1000;
-    return gap <= slack || (is_pressed_in && gap <= rebound + scene.travel);
+    return gap <= margin_ / 1000 || (is_pressed_in && gap <= rebound + scene.travel);
 }
 
 // Whether an end of the tool has passed through the surface since the last tick.
@@ -740,9 +739,9 @@ void ContactTracker<Scalar>::collect_candidates(int rings) noexcept {
     }
 }
 
-// Raises the depth to that below the nearest triangle of the rest surface. Beyond the middle of a body that triangle is
-// on the opposite wall; then to the nearest one that faces as the wall where the tool entered. Returns the largest gap
-// of a membrane that springs back [m]: it does not go past the nearest triangle.
+// Measures the depth to the nearest triangle of the rest surface, negative outside of it. Beyond the middle of a body
+// that triangle is on the opposite wall; then to the nearest one that faces as the wall where the tool entered. Returns
+// the largest gap of a membrane that springs back [m]: it does not go past the nearest triangle.
 template <Real Scalar>
 Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept {
     const std::array<Vector3<Scalar>, 3> probes{scene.tool.position, scene.tool.position + scene.tool.axis,
@@ -757,6 +756,7 @@ Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>
     const auto nearby = near_.items();
     bool beyond = false;
     Scalar rebound = 0;
+    contact.depth = std::numeric_limits<Scalar>::lowest();
     for (std::size_t i = 0; i < (is_shaft(scene.tool) ? 3U : 1U); ++i) {
         const Index start = origin_triangles_[i] == no_index ? contact.triangle : origin_triangles_[i];
         Index& f = origin_triangles_[i] = at_rest().walk_to_closest(scene.anchors, start, probes[i]);
