@@ -85,6 +85,7 @@ TEST_CASE("vertices carry a contact where all their triangles are small against 
         const double fine = 0.4;
         const membrane::ContactVertices vertices(surface, membrane::ConstPointsRef<double>(mesh.positions()), fine);
         Index carrying = 0;
+        Eigen::VectorXd round_of(mesh.vertex_count());
         for (Index v = 0; v < mesh.vertex_count(); ++v) {
             double largest = 0, sum = 0;
             const auto around = surface.triangles_of(v);
@@ -93,12 +94,23 @@ TEST_CASE("vertices carry a contact where all their triangles are small against 
                 largest = std::max(largest, square);
                 sum += square;
             }
-            REQUIRE(vertices.carries(v, radius) == (std::sqrt(largest) <= fine * radius));
+            const double size = std::sqrt(largest) / (fine * radius), round = std::clamp(2 - size, 0.0, 1.0);
             const double mean = sum / static_cast<double>(around.size());
-            REQUIRE(vertices.lift(v, radius) == Approx(std::sqrt(radius * radius + 0.2 * mean) - radius));
-            if (!vertices.carries(v, radius)) continue;
-            ++carrying;
+            round_of[v] = round;
+            REQUIRE(vertices.carries(v, radius) == (size < 2));
+            REQUIRE(vertices.lift(v, radius) == Approx(round * (std::sqrt(radius * radius + 0.2 * mean) - radius)));
             REQUIRE(vertices.lift(v, radius) <= vertices.largest_lift(radius));
+            carrying += round == 1;
+        }
+        for (Index f = 0; f < mesh.triangle_count(); ++f) {
+            const auto corners = surface.corners(f);
+            const double least = std::min({round_of[corners[0]], round_of[corners[1]], round_of[corners[2]]});
+            const double square = squared_radius_around(surface.triangle(mesh.positions(), f));
+            const double lift = vertices.face_lift(corners, radius);
+            REQUIRE(vertices.carry_alone(corners, radius) == (least == 1));
+            REQUIRE(lift <= (1e-9 - 1) * least * std::min(square, fine * fine * radius * radius) / (2 * radius));
+            REQUIRE(lift >= -least * fine * fine * radius / 2 * (1 + 1e-9));
+            for (const Index v : corners) REQUIRE(vertices.lift(v, radius) <= vertices.largest_lift(corners, radius));
         }
         CAPTURE(radius);
         CHECK(carrying > 0);
@@ -107,6 +119,7 @@ TEST_CASE("vertices carry a contact where all their triangles are small against 
     const membrane::ContactVertices none(surface, membrane::ConstPointsRef<double>(mesh.positions()), 0.0);
     CHECK(!none.carries(0, 1.0));
     CHECK(none.largest_lift(1.0) == 0);
+    CHECK(none.face_lift({0, 1, 2}, 1.0) == 0);
 }
 
 TEST_CASE("the tracker lists each vertex that carries the contact once, and the other faces", "[contact]") {
@@ -132,13 +145,14 @@ TEST_CASE("the tracker lists each vertex that carries the contact once, and the 
             for (const Index v : near.corners) {
                 if (carriers.carries(v, radius)) expected.insert(v);
             }
-            if (!carriers.carry(near.corners, radius)) faces.push_back(near.triangle);
+            if (!carriers.carry_alone(near.corners, radius)) faces.push_back(near.triangle);
         }
         bool vertices = false, others = false;
         for (const auto& point : contact.patch.points) {
             others |= point.feature != vertex_feature;
             if (point.feature != vertex_feature) {
                 REQUIRE(std::find(faces.begin(), faces.end(), point.triangle) != faces.end());
+                REQUIRE(point.lift == carriers.face_lift(point.corners, radius));
                 continue;
             }
             vertices = true;

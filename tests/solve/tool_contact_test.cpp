@@ -610,10 +610,12 @@ TEST_CASE("a point that stands still over a vertex feels a force that does", "[p
 }
 
 TEST_CASE("the force rises with the depth and is the slope of the energy", "[press]") {
-    for (int seed = 1; seed <= cases(20); ++seed) {
+    const std::array<double, 4> fine{0, 0.3, 0.5, 1};  // contact by faces, by faces and vertices, by vertices
+    for (int seed = 1; seed <= cases(4, 40); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
-        Loop loop(unit_sphere(), {.foundation = random.number(0.3, 3.0)}, exact);
+        const double fine_triangles = fine[static_cast<std::size_t>(seed % 4)];
+        Loop loop(unit_sphere(), {.foundation = random.number(0.3, 3.0), .fine_triangles = fine_triangles}, exact);
         Stroke stroke = random_stroke(static_cast<Over>(seed % 3), random);
         double last_force = 0;
         for (double part = 0.3; part < 1; part += 0.1) {
@@ -687,7 +689,7 @@ struct TwoTriangles {
         contact.gap = tool.position.z() - 1;
         contact.patch.detection_distance = 1.2;
         contact.patch.radius = 1;
-        contact.patch.triangles = contact.patch.candidates = triangles;
+        contact.patch.triangles = contact.patch.candidates = contact.patch.faces = triangles;
         rows.begin_step();
         contacts.begin_step();
         contacts.begin_points(0);

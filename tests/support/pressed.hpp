@@ -60,6 +60,7 @@ struct Pressed {
         contact.patch.points = points;
         contact.patch.triangles = touched;
         contact.patch.candidates = candidates;
+        contact.patch.faces = touched;
     }
 
     [[nodiscard]] membrane::Equilibrium rest_from(const membrane::Points<double>& start) const {

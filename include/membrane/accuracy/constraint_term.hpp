@@ -105,7 +105,7 @@ void describe(const ToolContact<Scalar>& press, Terms& terms) {
     contact.gap = press.contact.gap;
     contact.patch.detection_distance = press.contact.patch.detection_distance;
     contact.patch.radius = press.contact.patch.radius;
-    contact.patch.vertices = press.contact.patch.vertices;
+    contact.patch.fine_triangles = press.contact.patch.fine_triangles;
     terms.add(ConstraintTerm::press(tool, contact));
 }
 ///@}

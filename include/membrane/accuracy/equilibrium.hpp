@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <membrane/accuracy/elasticity.hpp>
 #include <membrane/accuracy/equilibrium_scene.hpp>
 #include <membrane/accuracy/equilibrium_solver.hpp>
+#include <membrane/contact/contact_vertices.hpp>
 #include <membrane/solve/propagation_queue.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
@@ -98,6 +101,21 @@ void check_fit(const ConstPointsRef<Scalar>& x, const TriangleMesh<Scalar>& mesh
     return seeds;
 }
 
+/// The vertices that carry the contact, for each tool; none if all contacts are by faces.
+template <Real Scalar>
+[[nodiscard]] std::vector<ContactVertices> carriers_of(const EquilibriumScene& scene,
+                                                       const TriangleMesh<Scalar>& mesh) {
+    const auto& tools = scene.tools();
+    const auto by_vertices = [](const ScenePress& pressing) { return pressing.fine_triangles > 0; };
+    if (std::none_of(tools.begin(), tools.end(), by_vertices)) return {};
+    const LocalSurface<Scalar> surface(mesh);
+    std::vector<ContactVertices> carriers;
+    for (const auto& pressing : tools) {
+        carriers.emplace_back(surface, ConstPointsRef<Scalar>(mesh.positions()), pressing.fine_triangles);
+    }
+    return carriers;
+}
+
 }  // namespace detail
 
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
@@ -121,7 +139,9 @@ Equilibrium equilibrium(const std::type_identity_t<ConstPointsRef<Scalar>>& x, c
         if (stays || scene.fixed(v)) fixed[static_cast<std::size_t>(v)] = 1;
     }
     const Elasticity elasticity(network, volume);
-    return EquilibriumSolver(start, mesh.triangles(), elasticity, scene, fixed, options).run(count);
+    auto carriers = detail::carriers_of(scene, mesh);
+    return EquilibriumSolver(start, mesh.triangles(), elasticity, scene, fixed, options, std::move(carriers))
+        .run(count);
 }
 
 }  // namespace membrane

@@ -72,7 +72,7 @@ struct ScenePress {
     Tool<double> tool;                  ///< at the end of the increments
     Vector3<double> exit_displacement;  ///< after it the tool just touches the surface from outside [m]
     double detection_distance;          ///< triangles within this distance of the tool are in contact [m]
-    const ContactVertices* vertices;    ///< that carry the contact; null: none do
+    double fine_triangles;              ///< of `TrackerOptions`
 };
 
 /// Targets, loads and tools of one increment.
@@ -273,8 +273,12 @@ inline void EquilibriumScene::press(const ConstraintTerm& term) {
         refuse(detail::equilibrium_name, "radius of the contact of constraint ", constraint_,
                " must be finite and positive [m], got ", contact.patch.radius);
     }
+    if (!(contact.patch.fine_triangles >= 0 && contact.patch.fine_triangles <= 1)) {
+        refuse(detail::equilibrium_name, "fine_triangles of the contact of constraint ", constraint_,
+               " must be from 0 to 1 [tool radii], got ", contact.patch.fine_triangles);
+    }
     ScenePress pressing{constraint_, tool, Vector3<double>::Zero(), contact.patch.detection_distance,
-                        contact.patch.vertices};
+                        contact.patch.fine_triangles};
     pressing.tool.radius = contact.patch.radius;
     if (contact.gap < 0)
         pressing.exit_displacement = contact.point + contact.patch.radius * contact.normal - contact.patch.axis_point;

@@ -23,11 +23,11 @@ namespace membrane {
 template <class ElasticModel>
 class EquilibriumSolver {
   public:
-    /// Starts from `x` (3 x V [m]). `fixed[v]` is not 0 if vertex v moves only to its target in the scene. Triangles
-    /// and scene must outlive the solver.
+    /// Starts from `x` (3 x V [m]). `fixed[v]` is not 0 if vertex v moves only to its target in the scene; `carriers`
+    /// are as for `tool_points`. Triangles and scene must outlive the solver.
     EquilibriumSolver(const Points<double>& x, const Triangles& triangles, const ElasticModel& elasticity,
                       const EquilibriumScene& scene, std::vector<unsigned char> fixed,
-                      const EquilibriumOptions& options);
+                      const EquilibriumOptions& options, std::vector<ContactVertices> carriers = {});
 
     /// Solves all increments. May be called once.
     [[nodiscard]] Equilibrium run(std::size_t constraint_count);
@@ -68,7 +68,7 @@ class EquilibriumSolver {
     std::vector<Vector3<double>> attachment_forces_;  // force on each attached point [N]
     double stiffness_ = 0;                            // of the stiffest spring [N/m]
     double penalty_ = 0;                              // weight of the penetration [N]
-    std::vector<const ContactVertices*> carriers_;    // of each tool
+    std::vector<ContactVertices> carriers_;           // for each tool
     Index iterations_ = 0;
 };
 
@@ -89,7 +89,8 @@ namespace detail {
 template <class ElasticModel>
 EquilibriumSolver<ElasticModel>::EquilibriumSolver(const Points<double>& x, const Triangles& triangles,
                                                    const ElasticModel& elasticity, const EquilibriumScene& scene,
-                                                   std::vector<unsigned char> fixed, const EquilibriumOptions& options)
+                                                   std::vector<unsigned char> fixed, const EquilibriumOptions& options,
+                                                   std::vector<ContactVertices> carriers)
     : triangles_(triangles),
       elasticity_(elasticity),
       scene_(scene),
@@ -98,9 +99,9 @@ EquilibriumSolver<ElasticModel>::EquilibriumSolver(const Points<double>& x, cons
       edge_(detail::mean_side(x, triangles)),
       spacing_(64 * std::numeric_limits<double>::epsilon() * x.cwiseAbs().maxCoeff()),
       system_(fixed_),
-      attachment_forces_(scene.point_attachments().size(), Vector3<double>::Zero()) {
+      attachment_forces_(scene.point_attachments().size(), Vector3<double>::Zero()),
+      carriers_(std::move(carriers)) {
     here_.elastic.x = x;
-    for (const auto& pressing : scene.tools()) carriers_.push_back(pressing.vertices);
 }
 
 template <class ElasticModel>

@@ -40,11 +40,11 @@ struct ToolPoint : ContactPoint<double> {
 [[nodiscard]] inline bool is_before(const ToolPoint& a, const ToolPoint& b);
 
 /// The contact points with a gap of at most `far` [m], sorted by `is_before`, without duplicates. A point on the axis
-/// has no normal and is left out. `carriers` are for each tool the vertices that carry the contact; null or fewer:
-/// none do. The gap of such a vertex is that beyond its lift. Cost: O(F) for each tool.
+/// has no normal and is left out. `carriers` are for each tool the vertices that carry the contact; none: the faces do.
+/// A gap is that beyond the point's lift. Cost: O(F) for each tool.
 [[nodiscard]] inline std::vector<ToolPoint> tool_points(const Triangles& triangles, const Points<double>& x,
                                                         std::span<const Tool<double>> tools, double max_distance,
-                                                        std::span<const ContactVertices* const> carriers = {});
+                                                        std::span<const ContactVertices> carriers = {});
 
 /// Second derivative of the gap by the positions of the triangle's corners, x y z each [1/m]. As the corners move, the
 /// closest points slide along edge, face and axis: each sliding direction is eliminated by a Schur complement.
@@ -98,11 +98,11 @@ inline bool is_before(const ToolPoint& a, const ToolPoint& b) { return detail::n
 
 inline std::vector<ToolPoint> tool_points(const Triangles& triangles, const Points<double>& x,
                                           std::span<const Tool<double>> tools, double max_distance,
-                                          std::span<const ContactVertices* const> carriers) {
+                                          std::span<const ContactVertices> carriers) {
     std::vector<ToolPoint> points;
     for (std::size_t i = 0; i < tools.size(); ++i) {
         const auto& tool = tools[i];
-        const ContactVertices* const vertices = i < carriers.size() ? carriers[i] : nullptr;
+        const ContactVertices* const vertices = i < carriers.size() && carriers[i].any() ? &carriers[i] : nullptr;
         const double lift = vertices == nullptr ? 0 : vertices->largest_lift(tool.radius);
         const double within = tool.radius + lift + max_distance;
         for (Index f = 0; f < static_cast<Index>(triangles.cols()); ++f) {
@@ -117,18 +117,19 @@ inline std::vector<ToolPoint> tool_points(const Triangles& triangles, const Poin
                 point.gap -= point.lift;
                 if (!point.normal.isZero(0) && point.gap <= max_distance) points.push_back(point);
             }
-            if (vertices != nullptr && vertices->carry(corners, tool.radius)) continue;
+            if (vertices != nullptr && vertices->carry_alone(corners, tool.radius)) continue;
             for (int feature = 0; feature < feature_pairs(tool); ++feature) {
                 auto point = contact_point(f, corners, triangle, tool, feature, tool.radius);
                 if (!point || point->normal.isZero(0)) continue;
-                if (vertices != nullptr)
-                    point->lift = vertices->lift(corners, triangle, point->weights, tool.axis, tool.radius);
+                point->lift = vertices == nullptr ? 0 : vertices->face_lift(corners, tool.radius);
                 point->gap -= point->lift;
                 if (point->gap <= max_distance) points.push_back({*point, i});
             }
         }
     }
-    std::stable_sort(points.begin(), points.end(), is_before);
+    // Of faces that share their nearest point, the one that may cut in least comes first.
+    const auto key = [](const ToolPoint& a) { return std::pair(detail::name_of(a), -a.lift); };
+    std::stable_sort(points.begin(), points.end(), [&](const auto& a, const auto& b) { return key(a) < key(b); });
     const auto same = [](const ToolPoint& a, const ToolPoint& b) { return detail::name_of(a) == detail::name_of(b); };
     points.erase(std::unique(points.begin(), points.end(), same), points.end());
     return points;

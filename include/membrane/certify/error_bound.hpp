@@ -170,7 +170,7 @@ ErrorReport ErrorBound<Convexity>::compute(const Equilibrium& rest,
     for (const auto& touch : rest.contacts) {
         if (touch.tool >= scene.tools().size()) return error_;
     }
-    const auto by_vertices = [](const ScenePress& press) { return press.vertices != nullptr; };
+    const auto by_vertices = [](const ScenePress& press) { return press.fine_triangles > 0; };
     if (std::any_of(scene.tools().begin(), scene.tools().end(), by_vertices)) {
         error_.status = BoundStatus::unsupported;
         return error_;

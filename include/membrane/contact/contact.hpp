@@ -9,8 +9,6 @@
 
 namespace membrane {
 
-class ContactVertices;  // of contact_vertices.hpp
-
 /// Contact in this tick and in the last.
 enum class ContactPhase {
     none,     ///< no contact
@@ -23,6 +21,7 @@ enum class ContactPhase {
 struct ContactTriangle {
     Index triangle;                ///< its index
     std::array<Index, 3> corners;  ///< its vertices
+    double lift = 0;               ///< least gap of its face, not above 0, see `ContactVertices` [m]
 };
 
 /// The tool and the surface around a contact: what `press`, grasper and smoothing need beside the contact itself.
@@ -41,17 +40,12 @@ struct ContactPatch {
     ///@{
     /// Valid until the tracker's next update: a contact point for each pair of triangle and tool feature within
     /// `detection_distance`; the triangles within it, by the active one, or on a path through; these and their
-    /// neighbours.
+    /// neighbours; and those of `triangles` whose faces carry the contact.
     std::span<const ContactPoint<Scalar>> points;
-    std::span<const ContactTriangle> triangles, candidates;
+    std::span<const ContactTriangle> triangles, candidates, faces;
     ///@}
 
-    ///@{
-    /// Which vertices carry the contact, valid as long as the tracker; null: none do. And, valid as above, those of
-    /// `triangles` that carry it with their faces then.
-    const ContactVertices* vertices = nullptr;
-    std::span<const ContactTriangle> faces;
-    ///@}
+    double fine_triangles = 0;  ///< of `TrackerOptions`: whether vertices carry the contact, see `ContactVertices`
 };
 
 /// The contact of the tool with the membrane: position, depth and phase.

@@ -139,6 +139,7 @@ class ContactTracker : public SplitCount {
     bool follow(const Scene& scene, Contact<Scalar>& contact) noexcept;
     bool find(const Scene& scene, Contact<Scalar>& contact) noexcept;
     [[nodiscard]] bool contacts(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    [[nodiscard]] bool touches(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
     bool sweep_test(const Scene& scene, Contact<Scalar>& contact) const noexcept;
     [[nodiscard]] std::optional<Contact<Scalar>> where_it_ends(const Scene& scene,
                                                                const Contact<Scalar>& passed) const noexcept;
@@ -343,9 +344,7 @@ Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, cons
     contact.patch.splits = (std::min)(tree.splits(), splits_);
     last_tool_ = tool;
     last_ = contact;
-    last_.patch.triangles = last_.patch.candidates = {};  // valid until the next update only
-    last_.patch.vertices = nullptr;
-    last_.patch.faces = {};
+    last_.patch.triangles = last_.patch.candidates = last_.patch.faces = {};  // valid until the next update only
     last_.patch.points = {};
     return contact;
 }
@@ -410,9 +409,7 @@ bool ContactTracker<Scalar>::find(const Scene& scene, Contact<Scalar>& contact) 
 // the tool may be outside of the surface at rest, too.
 template <Real Scalar>
 bool ContactTracker<Scalar>::contacts(const Scene& scene, Contact<Scalar>& contact) noexcept {
-    const auto triangle = surface_.triangle(scene.x, contact.triangle);
-    const Scalar here = vertices_.lift(contact.corners, triangle, contact.barycentric, scene.tool.axis, scene.radius);
-    if (!last_.touching() && contact.gap > here) return false;
+    if (!last_.touching() && !touches(scene, contact)) return false;
     const auto lift = static_cast<Scalar>(vertices_.largest_lift(contact.corners, scene.radius));
     const Scalar gap = contact.gap - lift;
     if (gap > 0 && (side_.slid_off() || is_below_border(scene, contact))) return false;
@@ -422,6 +419,18 @@ bool ContactTracker<Scalar>::contacts(const Scene& scene, Contact<Scalar>& conta
     if (is_hooked(scene, contact)) return false;
     if (!last_.touching()) return true;
     return gap <= margin_ / 1000 || (is_pressed_in && gap <= rebound + scene.travel);
+}
+
+// Whether the active triangle or a corner that carries the contact is as near to the tool as it may be.
+template <Real Scalar>
+bool ContactTracker<Scalar>::touches(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
+    const auto face_lift = static_cast<Scalar>(vertices_.face_lift(contact.corners, scene.radius));
+    if (contact.patch.tunnelled || contact.gap <= face_lift) return true;
+    return std::any_of(contact.corners.begin(), contact.corners.end(), [&](Index v) {
+        const auto from_axis = to_segment(membrane::point(scene.x, v), scene.tool.position, scene.tool.axis);
+        const auto lifted = scene.radius + static_cast<Scalar>(vertices_.lift(v, scene.radius));
+        return vertices_.carries(v, scene.radius) && norm(from_axis) <= lifted;
+    });
 }
 
 // Whether an end of the tool has passed through the surface since the last tick.
@@ -647,27 +656,29 @@ void ContactTracker<Scalar>::complete(const Scene& scene, Contact<Scalar>& conta
 template <Real Scalar>
 void ContactTracker<Scalar>::find_points(const Scene& scene, Contact<Scalar>& contact) noexcept {
     points_.clear();
-    std::span<const ContactTriangle> faces = contact.patch.triangles;
+    contact.patch.faces = contact.patch.triangles;
     if (!contact.patch.tunnelled && vertices_.any()) {
-        contact.patch.vertices = &vertices_;
+        contact.patch.fine_triangles = vertices_.fine();
         find_vertices(scene, contact);
         faces_.clear();
-        for (const auto& listed : faces) {
-            if (!vertices_.carry(listed.corners, scene.radius)) faces_.try_push_back(listed);
+        for (const auto& [f, corners, none] : contact.patch.triangles) {
+            if (vertices_.carry_alone(corners, scene.radius)) continue;
+            faces_.try_push_back({f, corners, vertices_.face_lift(corners, scene.radius)});
         }
-        contact.patch.faces = faces = faces_.items();
+        contact.patch.faces = faces_.items();
     }
-    const auto list = [&](const ContactPoint<Scalar>& point) {
+    const auto list = [&](ContactPoint<Scalar> point, double lift) {
         if (!contact.patch.tunnelled && point.gap + scene.radius > scene.detection_distance) return;
+        point.lift = static_cast<Scalar>(lift);
         if (!points_.try_push_back(point)) contact.patch.has_all_points = false;
     };
     const int features = feature_pairs(scene.tool);
-    if (features == 1) return find_points_of_sphere(scene, faces, list);
-    for (const auto& [f, corners] : faces) {
+    if (features == 1) return find_points_of_sphere(scene, contact.patch.faces, list);
+    for (const auto& [f, corners, lift] : contact.patch.faces) {
         const auto triangle = triangle_at(scene.x, corners);
         for (int feature = 0; feature < features; ++feature) {
             const auto point = contact_point(f, corners, triangle, scene.tool, feature, scene.radius);
-            if (point) list(*point);
+            if (point) list(*point, lift);
         }
     }
 }
@@ -707,10 +718,10 @@ void ContactTracker<Scalar>::find_points_of_sphere(const Scene& scene, std::span
         const Wide distance = norm(separation);
         for (std::size_t i = 0; i < (std::min)(triangles.size(), listed.size() - first); ++i) {
             const auto of_lane = [i](const Vector3<Wide>& a) { return Vector3<Scalar>(a[0][i], a[1][i], a[2][i]); };
-            const auto& [f, corners] = listed[first + i];
+            const auto& [f, corners, lift] = listed[first + i];
             ContactPoint<Scalar> point{f, 0, corners, of_lane(nearest.barycentric), of_lane(normal)};
             point.gap = distance[i] - scene.radius;
-            list(point);
+            list(point, lift);
         }
     }
 }

@@ -13,49 +13,25 @@
 ///
 ///     auto tracker = membrane::ContactTracker(mesh, {.fine_triangles = 0.5});
 ///     const auto contact = tracker.update(tree, x, tool);
-///     const auto* carriers = contact.patch.vertices;                         // null: faces carry the contact
-///     if (carriers != nullptr && carriers->carries(v, tool.radius)) {
-///         std::printf("%g m outside\n", carriers->lift(v, tool.radius));
+///     for (const auto& point : contact.patch.points) {
+///         if (point.feature == membrane::vertex_feature) std::printf("%g m outside\n", point.lift);
 ///     }
 namespace membrane {
-
-/// How far outside a tool a point of a face stays [m], for one face or several; negative where the face may cut in. By
-/// roundness and lifts of the corners, see `ContactVertices`, and the direction of a shaft. A surface through the
-/// corners that is as round as the tool lies outside the face by p / (2 radius): p is the product of the distances of
-/// the point from both ends of a chord of the circumcircle, the sum over the sides of weight times weight times squared
-/// length. A shaft is round across its axis only.
-template <Number N>
-[[nodiscard]] MEMBRANE_INLINE N face_lift(const Triangle<N>& triangle, const Vector3<N>& weights,
-                                          const Vector3<N>& roundness, const Vector3<N>& lifts,
-                                          const Vector3<Each<N>>& along, Each<N> radius) noexcept {
-    const Vector3<N> axis = along.template cast<N>();
-    const auto square = [&](const Vector3<N>& side) {
-        const N part = dot(side, axis);
-        return squared_norm(side) - part * part;
-    };
-    const N product = weights[0] * weights[1] * square(triangle.b - triangle.a) +
-                      weights[1] * weights[2] * square(triangle.c - triangle.b) +
-                      weights[2] * weights[0] * square(triangle.a - triangle.c);
-    const N inside = product / (2 * radius);
-    N sum = 0;
-    for (Eigen::Index k = 0; k < 3; ++k) sum += weights[k] * roundness[k] * (lifts[k] - inside);
-    return sum;
-}
 
 /// On a fine mesh the vertices stay outside the tool, and the faces between them cut into it. A smooth surface through
 /// the vertices of a face cuts in less than the face: it touches a tool of radius R, for faces of circumradius c, where
 /// the vertices stay sqrt(R^2 + w c^2) from the axis. If the vertices touched the tool, w = 0, a membrane on a
 /// foundation would push too little; with w = 1 the faces would touch it, and hold the membrane too far out.
 ///
-/// A vertex beside larger triangles does not carry the contact; the faces there do, lifted as far as the vertices would
-/// lift them (`face_lift`). The lift fades up to twice the size of `fine` triangles: on a graded mesh the force does
-/// not jump where faces take over.
+/// Larger triangles carry the contact with their faces. Up to twice the size of `fine` triangles both do: the larger
+/// they are, the less is a vertex lifted, and the less may a face cut in. So on a graded mesh the force does not jump
+/// where faces take over.
 ///
 /// Lengths are those of the mesh at rest, in double: what is fine does not change as the membrane stretches.
 class ContactVertices {
   public:
-    /// Of `surface` at rest at `x` (3 x V [m]). A vertex carries the contact with a tool if the circumradius of each of
-    /// its triangles is at most `fine` tool radii; 0: none does. Cost: O(V + F).
+    /// Of `surface` at rest at `x` (3 x V [m]). Triangles are fine if their circumradius is at most `fine` tool radii;
+    /// 0: none are. Cost: O(V + F).
     template <Real Scalar>
     ContactVertices(const LocalSurface<Scalar>& surface, const ConstPointsRef<Scalar>& x, double fine)
         : fine_(fine), squares_(fine > 0 ? static_cast<std::size_t>(x.cols()) : 0) {
@@ -72,45 +48,51 @@ class ContactVertices {
         visit(self.squares_);
     }
 
-    /// Whether any vertex may carry a contact.
+    ///@{
+    /// The largest circumradius of fine triangles [tool radii]; whether any vertex may carry a contact.
+    [[nodiscard]] double fine() const noexcept { return fine_; }
     [[nodiscard]] bool any() const noexcept { return fine_ > 0; }
+    ///@}
+
+    /// 1 for a vertex between triangles that are fine for a tool of this radius [m], 0 where one is twice as large as
+    /// that, or larger.
+    [[nodiscard]] double roundness(Index v, double radius) const noexcept {
+        return any() ? std::clamp(2 - std::sqrt(squares_[at(v)].largest) / (fine_ * radius), 0.0, 1.0) : 0;
+    }
 
     ///@{
-    /// Whether `v` carries the contact with a tool of this radius [m]; whether all corners do, and so the face does
-    /// not.
-    [[nodiscard]] bool carries(Index v, double radius) const noexcept {
-        return any() && squares_[at(v)].largest <= fine_ * fine_ * radius * radius;
-    }
-    [[nodiscard]] bool carry(const std::array<Index, 3>& corners, double radius) const noexcept {
-        return std::all_of(corners.begin(), corners.end(), [&](Index v) { return carries(v, radius); });
+    /// Whether `v` carries the contact with a tool of this radius [m]; whether these corners do so alone, without their
+    /// face.
+    [[nodiscard]] bool carries(Index v, double radius) const noexcept { return roundness(v, radius) > 0; }
+    [[nodiscard]] bool carry_alone(const std::array<Index, 3>& corners, double radius) const noexcept {
+        return std::all_of(corners.begin(), corners.end(), [&](Index v) { return roundness(v, radius) == 1; });
     }
     ///@}
 
     ///@{
-    /// How far outside a tool of this radius `v` stays; at most any of these corners, by as much as the contact is
-    /// theirs; at most any that carries the contact [m].
-    [[nodiscard]] double lift(Index v, double radius) const noexcept { return above(radius, squares_[at(v)].mean); }
+    /// How far outside a tool of this radius `v` stays; at most any of these corners; at most any vertex [m].
+    [[nodiscard]] double lift(Index v, double radius) const noexcept {
+        return any() ? roundness(v, radius) * above(radius, squares_[at(v)].mean) : 0;
+    }
     [[nodiscard]] double largest_lift(const std::array<Index, 3>& corners, double radius) const noexcept {
-        double largest = 0;
-        for (std::size_t k = 0; any() && k < 3; ++k)
-            largest = (std::max)(largest, roundness(corners[k], radius) * lift(corners[k], radius));
-        return largest;
+        return (std::max)({lift(corners[0], radius), lift(corners[1], radius), lift(corners[2], radius)});
     }
     [[nodiscard]] double largest_lift(double radius) const noexcept {
-        return any() ? above(radius, fine_ * fine_ * radius * radius) : 0;
+        // Roundness times squared size is largest where triangles are 4/3 as large as fine ones.
+        return any() ? 32.0 / 27 * above(radius, fine_ * fine_ * radius * radius) : 0;
     }
     ///@}
 
-    /// 1 for a vertex that carries the contact, 0 where the triangles around it are larger by a factor of two.
-    [[nodiscard]] double roundness(Index v, double radius) const noexcept {
-        return std::clamp(2 - std::sqrt(squares_[at(v)].largest) / (fine_ * radius), 0.0, 1.0);
+    /// How far outside a tool of this radius the face of these corners stays: not above 0, and as deep as a face
+    /// between points of the tool cuts into it where the triangles are fine [m].
+    [[nodiscard]] double face_lift(const std::array<Index, 3>& corners, double radius) const noexcept {
+        double round = any() ? 1 : 0, square = fine_ * fine_ * radius * radius;
+        for (std::size_t k = 0; any() && k < 3; ++k) {
+            round = (std::min)(round, roundness(corners[k], radius));
+            square = (std::min)(square, squares_[at(corners[k])].largest);
+        }
+        return -round * square / (2 * radius);
     }
-
-    /// How far outside a tool of this radius a point of a face stays, `triangle` now; see `face_lift` [m].
-    template <Real Scalar>
-    [[nodiscard]] Scalar lift(const std::array<Index, 3>& corners, const Triangle<Scalar>& triangle,
-                              const Vector3<Scalar>& weights, const Vector3<Scalar>& axis,
-                              Scalar radius) const noexcept;
 
   private:
     static constexpr double part = 0.2;  // w
@@ -156,19 +138,6 @@ void ContactVertices::measure(const LocalSurface<Scalar>& surface, const ConstPo
         found.mean += square / static_cast<double>(around.size());
     }
     squares_[at(v)] = found;
-}
-
-template <Real Scalar>
-Scalar ContactVertices::lift(const std::array<Index, 3>& corners, const Triangle<Scalar>& triangle,
-                             const Vector3<Scalar>& weights, const Vector3<Scalar>& axis,
-                             Scalar radius) const noexcept {
-    Vector3<Scalar> round, lifts;
-    for (std::size_t k = 0; any() && k < 3; ++k) {
-        const auto row = static_cast<Eigen::Index>(k);
-        round[row] = static_cast<Scalar>(roundness(corners[k], radius));
-        lifts[row] = static_cast<Scalar>(lift(corners[k], radius));
-    }
-    return any() ? face_lift(triangle, weights, round, lifts, direction_or_zero(axis), radius) : Scalar(0);
 }
 
 }  // namespace membrane

@@ -191,7 +191,7 @@ void Grasper<Scalar>::take_point(const Contact<Scalar>& contact, const ConstPoin
     if (!(sum > 1) || !(norm(normal) > sum / 8)) return;
     const Vector3<Scalar> from = axis_point / sum, to = from - 4 * contact.patch.radius * direction(normal, normal);
     Scalar first = infinity;
-    for (const auto& [triangle, corners] : contact.patch.candidates) {
+    for (const auto& [triangle, corners, lift] : contact.patch.candidates) {
         const auto hit = first_hit(triangle_at(x, corners), from, to);
         if (!hit || !(hit->fraction < first)) continue;
         first = hit->fraction;

@@ -67,12 +67,9 @@ struct alignas(32) ContactPack {
     Load load;      ///< by the last pass
     Load applied;   ///< included in the rows of forces
     Wide distance;  ///< of the tool's axis from the points, along their normals [m]
-    ///@{
-    /// Of the corners, see `face_lift` [1], [m]; of a vertex that carries the contact, its lift.
-    Vector3<Wide> roundness, lift;
-    ///@}
-    Wide wall;    ///< of such vertices: how far along the normal they may go [m]
-    Wide change;  ///< of the forces in the last pass [N]
+    Wide lift;      ///< least gap of the points, see `ContactVertices` [m]
+    Wide wall;      ///< of vertices that carry the contact: how far along the normal they may go [m]
+    Wide change;    ///< of the forces in the last pass [N]
 
     Vector3<Wide> free;  ///< 1 for a corner that may move
     Wide side;           ///< of the points, see `ContactPoint::side`
@@ -87,7 +84,6 @@ struct alignas(32) ContactPack {
     bool on_fixed = false;                           ///< whether a corner of a point is fixed or shared
     bool has_walls = false;                          ///< whether updates of its vertices find the forces
     bool has_sides = false;                          ///< whether the side of a point is known
-    bool is_lifted = false;                          ///< whether a corner of a face is round
     bool acts = true;  ///< whether a point pressed or penetrated in the last pass over all packs
 };
 
@@ -148,8 +144,8 @@ void ContactPacks<Scalar>::begin_pack(ContactKind kind) noexcept {
     const Vector3<Lanes<Scalar>> none(0, 0, 0);
     pack.load = {{1, 0, 0}, none, 0, none};  // unused lanes have valid numbers
     pack.applied = {none, none, 0, none};
-    pack.free = pack.roundness = pack.lift = none;
-    pack.distance = pack.wall = pack.change = pack.side = pack.end = pack.listed = pack.used = Scalar(0);
+    pack.free = none;
+    pack.distance = pack.lift = pack.wall = pack.change = pack.side = pack.end = pack.listed = pack.used = Scalar(0);
     for (auto& begins : pack.corner) begins.fill(unused_row_);
     pack.point.fill(no_index);
     pack.turn.fill(0);
@@ -172,7 +168,7 @@ void ContactPacks<Scalar>::add_lane(ContactPack<Scalar>& pack, const ContactPoin
     }
     for (Eigen::Index k = 0; k < 3; ++k) pack.load.normal[k].set(i, point.normal[k]);
     pack.load.force.set(i, norm(point.force));
-    pack.lift[0].set(i, point.lift);
+    pack.lift.set(i, point.lift);
     pack.end.set(i, point.feature == 1 ? Scalar(1) : Scalar(0));
     pack.side.set(i, point.side);
     pack.has_sides = pack.has_sides || point.side != 0;

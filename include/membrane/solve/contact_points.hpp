@@ -303,19 +303,6 @@ struct LocatedPack {
     Lanes<Scalar> gap;  // beyond the lift, along the normals, with the displacement of fixed corners [m]
 };
 
-template <std::size_t corners, Real Scalar>
-[[nodiscard]] MEMBRANE_INLINE Lanes<Scalar> lift_of(const ToolShape<Scalar>& tool,
-                                                    const std::array<PaddedLanes<Scalar>, corners>& corner,
-                                                    const ContactPack<Scalar>& pack) noexcept {
-    if constexpr (corners == 3) {
-        if (!pack.is_lifted) return 0;
-        return face_lift<Lanes<Scalar>>({corner[0].point, corner[1].point, corner[2].point}, pack.load.weights,
-                                        pack.roundness, pack.lift, direction_or_zero(tool.axis), tool.radius);
-    } else {
-        return pack.lift[0];
-    }
-}
-
 /// Locates the points of a pack. Fixed corners respond to the forces so far, which are added to the rows.
 template <std::size_t corners, Real Scalar>
 [[nodiscard]] MEMBRANE_NOINLINE MEMBRANE_FLATTEN LocatedPack<corners, Scalar> located_pack(
@@ -327,7 +314,7 @@ template <std::size_t corners, Real Scalar>
         add_forces<corners>(rows, contacts, pack);
         now.support = support_of<corners>(contacts, pack);
     }
-    now.gap = pack.distance - now.support.displacement - (tool.radius + lift_of(tool, now.corner, pack));
+    now.gap = pack.distance - now.support.displacement - (tool.radius + pack.lift);
     if constexpr (corners == 1) pack.wall = dot(pack.load.normal, now.corner[0].point) + now.gap;
     return now;
 }

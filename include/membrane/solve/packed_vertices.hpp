@@ -222,8 +222,9 @@ class PackedVertices {
         return Wide::of(
             [&](std::size_t i) { return rows.added_stiffness[static_cast<std::size_t>(row_at(packs_[p].own[i]))]; });
     }
-    [[nodiscard]] Vector3<Wide> stop_at_walls(std::size_t p, PackState& at, const Symmetric3<Wide>& block,
-                                              VertexRows<Scalar>& rows) const noexcept;
+    template <class Move>
+    void stop_at_walls(std::size_t p, PackState& at, const Symmetric3<Wide>& block, Scalar tolerance, Move& move,
+                       VertexRows<Scalar>& rows) const noexcept;
     void keep_response(std::size_t p, const PackState& at, const Symmetric3<Wide>& block,
                        VertexRows<Scalar>& rows) const noexcept;
 
@@ -447,10 +448,13 @@ MEMBRANE_INLINE void PackedVertices<Scalar>::keep_response(std::size_t p, const 
 }
 
 // Changes the multipliers of vertices with a wall so that their displacements, `block` times the force, end in front of
-// it, or on it: Newton's step of the vertex under its constraint, over-relaxed. Returns the displacements.
+// it, or on it: Newton's step of the vertex under its constraint, over-relaxed. A vertex behind its wall moves even if
+// its force is negligible.
 template <Real Scalar>
-MEMBRANE_INLINE auto PackedVertices<Scalar>::stop_at_walls(std::size_t p, PackState& at, const Symmetric3<Wide>& block,
-                                                           VertexRows<Scalar>& rows) const noexcept -> Vector3<Wide> {
+template <class Move>
+MEMBRANE_INLINE void PackedVertices<Scalar>::stop_at_walls(std::size_t p, PackState& at, const Symmetric3<Wide>& block,
+                                                           Scalar tolerance, Move& move,
+                                                           VertexRows<Scalar>& rows) const noexcept {
     const auto& own = packs_[p].own;
     const auto wall = gather_padded(rows.wall.data(), own.data());
     const Vector3<Wide>& normal = wall.point;
@@ -471,7 +475,9 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::stop_at_walls(std::size_t p, PackSt
     for (std::size_t i = 0; i < packs_[p].size; ++i) {
         rows.multiplier[static_cast<std::size_t>(row_at(own[i]))] = multiplier[i];
     }
-    return factor * (block * at.vertex.force);
+    move.displacement = factor * (block * at.vertex.force);
+    move.moves = (norm(at.vertex.force) > tolerance) |
+                 (held & (dot<Wide>(normal, at.here) - wall.extra > tolerance * move.least));
 }
 
 // Evaluates the forces on the vertices of a pack.
@@ -533,10 +539,7 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::move(std::size_t p, PackState at, c
     if (at.vertex.constrained) {
         const auto block = as_block<Wide>(move.compliance);
         keep_response(p, at, block, rows);
-        if (at.has_walls) {
-            move.displacement = stop_at_walls(p, at, block, rows);
-            move.moves = norm(at.vertex.force) > tolerance;
-        }
+        if (at.has_walls) stop_at_walls(p, at, block, tolerance, move, rows);
     }
     const auto moves = move.moves & may_move;
     Vector3<Wide> displacement = move.displacement;

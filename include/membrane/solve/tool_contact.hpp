@@ -10,7 +10,6 @@
 #include <utility>
 
 #include <membrane/contact/contact.hpp>
-#include <membrane/contact/contact_vertices.hpp>
 #include <membrane/contact/grasper.hpp>
 #include <membrane/contact/tool.hpp>
 #include <membrane/solve/constraints.hpp>
@@ -66,12 +65,11 @@ struct ToolContact {
     bool seed(Context& context) const noexcept;
     void list_candidates(Context& context) const noexcept;
     void carry_with_tool(Context& context) const noexcept;
-    void clear_contact_point(Context& context, Scalar lift) const noexcept;
+    void clear_contact_point(Context& context) const noexcept;
     void find_points(Context& context) const noexcept;
     void add_point(Context& context, ContactPoint<Scalar> point) const noexcept;
     void stay_on_side(const Context& context, ContactPoint<Scalar>& point) const noexcept;
     void pack_points(Context& context) const noexcept;
-    void lift_faces(ContactPack<Scalar>& pack) const noexcept;
     [[nodiscard]] std::optional<Vector3<Scalar>> direction_out_of_support(const Context& context) const noexcept;
     void touch_support(Context& context, const Vector3<Scalar>& out) const noexcept;
     [[nodiscard]] bool comes_out(const Triangle<Scalar>& before, const Triangle<Scalar>& now) const noexcept;
@@ -83,13 +81,6 @@ struct ToolContact {
     }
     [[nodiscard]] ToolShape<Scalar> shape() const noexcept {
         return {tool.position, tool.axis, contact.patch.axis_point, contact.patch.radius};
-    }
-    // The least gap of a point of a face, see `ContactVertices`.
-    [[nodiscard]] Scalar lift_at(const Context& context, const Corners& corners,
-                                 const Vector3<Scalar>& weights) const noexcept {
-        const auto* const carriers = contact.patch.vertices;
-        if (carriers == nullptr) return 0;
-        return carriers->lift(corners, triangle_of(context, corners), weights, tool.axis, contact.patch.radius);
     }
     [[nodiscard]] static auto packs(Context& context) noexcept {
         return context.step().contacts.pack_ranges[context.constraint()].of(context.step().contacts.packs.items());
@@ -169,14 +160,7 @@ void ToolContact<Scalar>::begin(Context& context) const noexcept {
     const auto out = direction_out_of_support(context);
     if (contact.patch.tunnelled && !out) carry_with_tool(context);
     list_candidates(context);  // after that: `go_back` does not undo it
-    const auto* const carriers = contact.patch.vertices;
-    const bool by_vertices = carriers != nullptr && carriers->carry(contact.corners, contact.patch.radius);
-    const bool held = by_vertices || is_on_fixed(context, contact.corners);  // these penetrate at equilibrium, too
-    const Scalar lift = lift_at(context, contact.corners, contact.barycentric);
-    if (!contact.patch.tunnelled && !out && !held &&
-        contact.gap < lift - negligible_distance(context, contact.corners[0])) {
-        clear_contact_point(context, lift);
-    }
+    if (!contact.patch.tunnelled && !out) clear_contact_point(context);
     out ? touch_support(context, *out) : find_points(context);
     if (step.refusal() != StepStatus::advanced) return;
     pack_points(context);
@@ -198,6 +182,7 @@ bool ToolContact<Scalar>::seed(Context& context) const noexcept {
     check(contact.corners);
     for (const auto& listed : contact.patch.triangles) check(listed.corners);
     for (const auto& listed : contact.patch.candidates) check(listed.corners);
+    for (const auto& listed : contact.patch.faces) check(listed.corners);
     for (const auto& found : contact.patch.points) check(found.corners);
     if (!context.validate(least) || !context.validate(largest)) return false;
     for (const auto& listed : contact.patch.triangles) {
@@ -245,9 +230,16 @@ void ToolContact<Scalar>::carry_with_tool(Context& context) const noexcept {
     }
 }
 
-// If the contact point penetrates, moves the surface there until it just touches the tool.
+// If the contact point penetrates, moves the surface there until it just touches the tool. Where its face does not
+// carry the contact, or has fixed corners, it penetrates at equilibrium, too.
 template <Real Scalar>
-void ToolContact<Scalar>::clear_contact_point(Context& context, Scalar lift) const noexcept {
+void ToolContact<Scalar>::clear_contact_point(Context& context) const noexcept {
+    const auto faces = contact.patch.faces;
+    const auto is_active = [&](const ContactTriangle& face) { return face.triangle == contact.triangle; };
+    const auto active = std::find_if(faces.begin(), faces.end(), is_active);
+    if (active == faces.end() || is_on_fixed(context, contact.corners)) return;
+    const auto lift = static_cast<Scalar>(active->lift);
+    if (!(contact.gap < lift - negligible_distance(context, contact.corners[0]))) return;
     const Vector3<Scalar> now = point_at(surface_triangle(context, contact.corners), contact.barycentric);
     const Vector3<Scalar> by = contact.patch.axis_point - (contact.patch.radius + lift) * contact.normal - now;
     if (dot(by, contact.normal) < 0) press_in<Scalar>(context, contact.corners, contact.barycentric, by);
@@ -263,9 +255,11 @@ void ToolContact<Scalar>::find_points(Context& context) const noexcept {
             add_point(context, found);
             continue;
         }
-        const auto point = contact_point(found.triangle, found.corners, triangle_of(context, found.corners), tool,
-                                         found.feature, contact.patch.radius);
-        if (point) add_point(context, *point);
+        auto point = contact_point(found.triangle, found.corners, triangle_of(context, found.corners), tool,
+                                   found.feature, contact.patch.radius);
+        if (!point) continue;
+        point->lift = found.lift;
+        add_point(context, *point);
     }
 }
 
@@ -328,24 +322,6 @@ void ToolContact<Scalar>::pack_points(Context& context) const noexcept {
     contacts.packs.append(std::span<const ContactPoint<Scalar>>(points),
                           contacts.point_ranges[context.constraint()].begin, [&](Index v) { return context.fixed(v); });
     range.end = contacts.packs.size();
-    if (contact.patch.vertices == nullptr) return;
-    for (auto& pack : packs(context)) {
-        if (pack.kind != ContactKind::vertex) lift_faces(pack);
-    }
-}
-
-template <Real Scalar>
-void ToolContact<Scalar>::lift_faces(ContactPack<Scalar>& pack) const noexcept {
-    const auto& carriers = *contact.patch.vertices;
-    for (std::size_t i = 0; i < pack.size; ++i) {
-        for (std::size_t k = 0; k < 3; ++k) {
-            const Index v = row_at(pack.corner[k][i]);
-            const auto roundness = static_cast<Scalar>(carriers.roundness(v, contact.patch.radius));
-            pack.roundness[static_cast<Eigen::Index>(k)].set(i, roundness);
-            pack.lift[static_cast<Eigen::Index>(k)].set(i, static_cast<Scalar>(carriers.lift(v, contact.patch.radius)));
-            pack.is_lifted = pack.is_lifted || roundness > 0;
-        }
-    }
 }
 
 // Fixed vertices do not yield to a tool: if it penetrates by more than its radius, its axis is behind them. Then the
@@ -459,7 +435,7 @@ bool ToolContact<Scalar>::has_new_overlap(const Context& context) const noexcept
     const auto points = context.points();
     auto next = points.begin();  // vertices first, then in the order of the triangles
     while (next != points.end() && is_vertex(*next)) ++next;
-    for (const auto& listed : contact.patch.vertices == nullptr ? contact.patch.triangles : contact.patch.faces) {
+    for (const auto& listed : contact.patch.faces) {
         for (int feature = 0; feature < features; ++feature) {
             if (next != points.end() && next->triangle == listed.triangle && next->feature == feature) {
                 ++next;
@@ -468,8 +444,8 @@ bool ToolContact<Scalar>::has_new_overlap(const Context& context) const noexcept
             const auto nearest = closest_points(surface_triangle(context, listed.corners), tool, feature);
             const Scalar slack = negligible_distance(context, listed.corners[0]);
             if (!nearest) continue;
-            const Scalar lift = lift_at(context, listed.corners, nearest->barycentric);
-            if (norm(nearest->separation) < contact.patch.radius + lift - slack) return true;
+            if (norm(nearest->separation) < contact.patch.radius + static_cast<Scalar>(listed.lift) - slack)
+                return true;
         }
     }
     return false;
