@@ -13,7 +13,6 @@
 #include <membrane/accuracy/equilibrium.hpp>
 #include <membrane/accuracy/tangent_stiffness.hpp>
 #include <membrane/certify/factored_convexity.hpp>
-#include <membrane/contact/contact_tracker.hpp>
 #include <membrane/model/moving_foundation.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_contact.hpp>
@@ -602,19 +601,4 @@ TEST_CASE("a membrane that has torn has the bounds and the tangent of the torn m
     }
     CHECK(certified > 2 * cases(20));
     CHECK(torn_splits > cases(20));
-}
-
-TEST_CASE("a contact that vertices carry has no bound", "[certify]") {
-    const auto mesh = icosphere<double>({.radius = 0.01, .subdivisions = 2});
-    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0});
-    const VirtualVolumeSprings foundation(mesh, {.stiffness = 8.0});
-    ContactTracker<double> tracker(mesh, {.fine_triangles = 1});
-    const Tool<double> tool{.position = {0, 0, 0.0179}, .radius = 8e-3};
-    const auto contact = tracker.update(AabbTree<double>(mesh), mesh.positions(), tool);
-    const auto rest = equilibrium(mesh.positions(), mesh, network, foundation, {}, press(tool, contact));
-    REQUIRE(rest.converged);
-    REQUIRE(!rest.contacts.empty());
-    ErrorBound bound(network);
-    CHECK(bound.compute(rest, rest.x, mesh, network, foundation, press(tool, contact)).status ==
-          BoundStatus::unsupported);
 }

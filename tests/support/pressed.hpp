@@ -24,10 +24,11 @@ namespace test {
 
 /// A sphere of radius 1 with springs of 1 N/m, into which a tool is pressed by a solver that is given little time.
 struct Pressed {
-    Pressed(std::uint64_t seed, membrane::Index subdivisions, double foundation_stiffness)
+    Pressed(std::uint64_t seed, membrane::Index subdivisions, double foundation_stiffness, double fine_triangles = 0)
         : random(seed),
           mesh(membrane::icosphere({.radius = 1, .subdivisions = subdivisions})),
-          foundation(mesh, {.stiffness = foundation_stiffness}) {
+          foundation(mesh, {.stiffness = foundation_stiffness}),
+          fine_triangles(fine_triangles) {
         edge = 2.0 / (1 << subdivisions) * 0.6;
     }
 
@@ -44,7 +45,7 @@ struct Pressed {
                   membrane::Index ticks) {
         membrane::QuasiStaticSolver solver(network, options);
         membrane::AabbTree<double> tree(mesh);
-        membrane::ContactTracker<double> tracker(mesh);
+        membrane::ContactTracker<double> tracker(mesh, {.fine_triangles = fine_triangles});
         for (membrane::Index tick = 0; tick <= ticks; ++tick) {
             const double part = std::min(1.5 * tick / ticks, 1.0);
             tool.position = (1 + tool.radius + 0.05 - (0.05 + deep) * part) * outward;
@@ -57,10 +58,11 @@ struct Pressed {
         touched.assign(contact.patch.triangles.begin(), contact.patch.triangles.end());
         candidates.assign(contact.patch.candidates.begin(), contact.patch.candidates.end());
         points.assign(contact.patch.points.begin(), contact.patch.points.end());
+        faces.assign(contact.patch.faces.begin(), contact.patch.faces.end());
         contact.patch.points = points;
         contact.patch.triangles = touched;
         contact.patch.candidates = candidates;
-        contact.patch.faces = touched;
+        contact.patch.faces = faces;
     }
 
     [[nodiscard]] membrane::Equilibrium rest_from(const membrane::Points<double>& start) const {
@@ -72,10 +74,10 @@ struct Pressed {
     membrane::MassSpringNetwork<double, membrane::LinearSpring> network{
         mesh, membrane::LinearSpring{}, membrane::NetworkOptions<double>{.stiffness = 1.0}};
     membrane::VirtualVolumeSprings<double> foundation;
-    double edge;
+    double edge, fine_triangles;
     membrane::Tool<double> tool;
     membrane::Contact<double> contact;
-    std::vector<membrane::ContactTriangle> touched, candidates;
+    std::vector<membrane::ContactTriangle> touched, candidates, faces;
     std::vector<membrane::ContactPoint<double>> points;
     membrane::Points<double> x = mesh.positions();
     membrane::Vector3<double> force = membrane::Vector3<double>::Zero();

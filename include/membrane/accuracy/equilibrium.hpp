@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <string_view>
@@ -12,7 +11,6 @@
 #include <membrane/accuracy/elasticity.hpp>
 #include <membrane/accuracy/equilibrium_scene.hpp>
 #include <membrane/accuracy/equilibrium_solver.hpp>
-#include <membrane/contact/contact_vertices.hpp>
 #include <membrane/solve/propagation_queue.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
@@ -99,21 +97,6 @@ void check_fit(const ConstPointsRef<Scalar>& x, const TriangleMesh<Scalar>& mesh
         }
     }
     return seeds;
-}
-
-/// The vertices that carry the contact, for each tool; none if all contacts are by faces.
-template <Real Scalar>
-[[nodiscard]] std::vector<ContactVertices> carriers_of(const EquilibriumScene& scene,
-                                                       const TriangleMesh<Scalar>& mesh) {
-    const auto& tools = scene.tools();
-    const auto by_vertices = [](const ScenePress& pressing) { return pressing.fine_triangles > 0; };
-    if (std::none_of(tools.begin(), tools.end(), by_vertices)) return {};
-    const LocalSurface<Scalar> surface(mesh);
-    std::vector<ContactVertices> carriers;
-    for (const auto& pressing : tools) {
-        carriers.emplace_back(surface, ConstPointsRef<Scalar>(mesh.positions()), pressing.fine_triangles);
-    }
-    return carriers;
 }
 
 }  // namespace detail

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <string_view>
@@ -9,6 +10,8 @@
 
 #include <membrane/accuracy/constraint_term.hpp>
 #include <membrane/accuracy/tool_points.hpp>
+#include <membrane/contact/contact_vertices.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 /// The constraints of a membrane in equilibrium, described by those of a step or by user-defined ones: see
 /// `ConstraintTerm`, or
@@ -184,8 +187,25 @@ static_assert(StaticConstraint<VertexAttachment<float>> && StaticConstraint<Poin
 static_assert(StaticConstraint<PointLoad<float>> && StaticConstraint<ToolContact<double>>);
 
 namespace detail {
-inline constexpr std::string_view equilibrium_name = "equilibrium";
+
+/// The vertices that carry the contact, for each tool; none if all contacts are by faces.
+template <Real Scalar>
+[[nodiscard]] std::vector<ContactVertices> carriers_of(const EquilibriumScene& scene,
+                                                       const TriangleMesh<Scalar>& mesh) {
+    const auto& tools = scene.tools();
+    const auto by_vertices = [](const ScenePress& pressing) { return pressing.fine_triangles > 0; };
+    if (std::none_of(tools.begin(), tools.end(), by_vertices)) return {};
+    const LocalSurface<Scalar> surface(mesh);
+    std::vector<ContactVertices> carriers;
+    for (const auto& pressing : tools) {
+        carriers.emplace_back(surface, ConstPointsRef<Scalar>(mesh.positions()), pressing.fine_triangles);
+    }
+    return carriers;
 }
+
+inline constexpr std::string_view equilibrium_name = "equilibrium";
+
+}  // namespace detail
 
 inline void EquilibriumOptions::validate() const {
     const auto at_least = [](Index number, Index least, std::string_view name) {

@@ -36,10 +36,11 @@ class ContactBounds {
     void clear() noexcept;
 
     /// Takes the tools of a scene, and the contact points whose forces approximately balance the membrane at `y` (3 x V
-    /// [m]). Offline.
+    /// [m]); `carriers` are as for `tool_points`. Offline.
     /// @pre the contact points are of these tools
     void assign(const EquilibriumProblem& problem, const Triangles& triangles, const Points<double>& y,
-                std::span<const ScenePress> tools, std::span<const ToolPoint> contacts);
+                std::span<const ScenePress> tools, std::span<const ToolPoint> contacts,
+                std::span<const ContactVertices> carriers = {});
 
     /// Computes the bounds below for all states within `max_displacement` [m] of y, where the membrane acts on its
     /// vertices with `force`, a sum of terms of this `magnitude` [N]. False if a tool may touch a vertex that is fixed
@@ -77,9 +78,10 @@ class ContactBounds {
     static constexpr std::size_t none = (std::numeric_limits<std::size_t>::max)();
 
     using Wide = Eigen::Matrix<long double, 3, 1>;
-    struct Near {  // a triangle that a tool may touch
+    struct Near {  // a triangle that a tool may touch, or a vertex that carries the contact, three times
         std::size_t tool;
         std::array<Index, 3> corners;
+        double reach;       // least distance from the axis: the tool's radius and the lift [m]
         Vector3<double> u;  // from the axis to the triangle
         double distance;    // [m]
     };
@@ -90,7 +92,10 @@ class ContactBounds {
         double softening = 0;  // [N/m]
     };
     [[nodiscard]] static std::size_t at(Index v) noexcept { return static_cast<std::size_t>(v); }
-    void find_near(std::size_t i, const Triangles& triangles, const Points<double>& y, const Tool<double>& tool);
+    void find_near(std::size_t i, const Triangles& triangles, const Points<double>& y, const Tool<double>& tool,
+                   const ContactVertices* vertices);
+    void add_near(std::size_t i, const std::array<Index, 3>& corners, double lift, const Points<double>& y,
+                  const Tool<double>& tool);
     [[nodiscard]] Vector3<double> take_contact(const ToolPoint& contact, const Points<double>& y,
                                                const Tool<double>& tool) noexcept;
     [[nodiscard]] static Wide wide(const Vector3<double>& a) noexcept { return {a.x(), a.y(), a.z()}; }
@@ -99,9 +104,8 @@ class ContactBounds {
     }
     bool mark(const EquilibriumProblem& problem, double max_displacement) noexcept;
     bool narrow(double max_displacement) noexcept;
-    [[nodiscard]] double radius_of(const Near& candidate) const noexcept { return radii_[candidate.tool]; }
 
-    std::vector<double> radii_;  // of the tools [m]
+    std::vector<double> radii_;  // least distances of what touches from the axes of the tools [m]
     std::vector<Near> near_;
     std::vector<ToolPoint> contacts_;
     std::vector<Mark> marks_;
@@ -121,11 +125,11 @@ inline void ContactBounds::clear() noexcept {
 
 inline void ContactBounds::assign(const EquilibriumProblem& problem, const Triangles& triangles,
                                   const Points<double>& y, std::span<const ScenePress> tools,
-                                  std::span<const ToolPoint> contacts) {
+                                  std::span<const ToolPoint> contacts, std::span<const ContactVertices> carriers) {
     clear();
     for (std::size_t i = 0; i < tools.size(); ++i) {
         radii_.push_back(tools[i].tool.radius);
-        find_near(i, triangles, y, tools[i].tool);
+        find_near(i, triangles, y, tools[i].tool, carriers.empty() ? nullptr : &carriers[i]);
     }
     std::fill(borne_.begin(), borne_.end(), 0.0);
     for (const auto& contact : contacts) {
@@ -142,30 +146,42 @@ inline void ContactBounds::assign(const EquilibriumProblem& problem, const Trian
     }
 }
 
+inline void ContactBounds::find_near(std::size_t i, const Triangles& triangles, const Points<double>& y,
+                                     const Tool<double>& tool, const ContactVertices* vertices) {
+    const double reach = tool.radius + (vertices == nullptr ? 0 : vertices->largest_lift(tool.radius));
+    for (const auto& of_triangle : triangles.colwise()) {
+        const std::array<Index, 3> corners{of_triangle[0], of_triangle[1], of_triangle[2]};
+        if (detail::is_far(triangle_at(y, corners), tool, 1.25 * reach)) continue;
+        for (const Index v : vertices == nullptr ? std::span<const Index>() : std::span<const Index>(corners)) {
+            if (vertices->carries(v, tool.radius)) add_near(i, {v, v, v}, vertices->lift(v, tool.radius), y, tool);
+        }
+        if (vertices != nullptr && vertices->carry_alone(corners, tool.radius)) continue;
+        add_near(i, corners, vertices == nullptr ? 0 : vertices->face_lift(corners, tool.radius), y, tool);
+    }
+}
+
 // Computed relative to the tool, where numbers are small, and in long double: the bound is no better than the square
 // root of rounding. The smallest projection of a corner onto u is a lower bound of the distance from the axis, even if
 // u is off by rounding.
-inline void ContactBounds::find_near(std::size_t i, const Triangles& triangles, const Points<double>& y,
-                                     const Tool<double>& tool) {
-    for (const auto& corners : triangles.colwise()) {
-        const auto triangle = triangle_at(y, corners);
-        if (detail::is_far(triangle, tool, 1.25 * tool.radius)) continue;
-        const auto nearest = closest_to_axis(triangle, tool);
-        const Vector3<double> separation = nearest.on_triangle.point - tool.position - nearest.fraction * tool.axis;
-        const Vector3<double> u = direction<double>(separation, Vector3<double>::Zero());
-        const Wide wide_u = wide(u), axis = wide(tool.axis);
-        long double distance = std::numeric_limits<long double>::infinity(), size = axis.norm() + tool.radius;
-        for (const Index v : corners) {
-            const Wide corner = seen_from(tool, y, v);
-            distance = (std::min)(distance, wide_u.dot(corner));
-            size = (std::max)(size, corner.norm() + axis.norm());
-        }
-        distance = (distance - (std::max)(wide_u.dot(axis), 0.0L)) / (std::max)(wide_u.norm(), 0.5L);
-        constexpr long double rounding = 16 * std::numeric_limits<long double>::epsilon();
-        rounding_ = (std::max)(rounding_, static_cast<double>(rounding * size));
-        penetration_ = (std::max)(penetration_, static_cast<double>(tool.radius - distance + rounding * size));
-        near_.push_back({i, {corners[0], corners[1], corners[2]}, u, static_cast<double>(distance)});
+inline void ContactBounds::add_near(std::size_t i, const std::array<Index, 3>& corners, double lift,
+                                    const Points<double>& y, const Tool<double>& tool) {
+    const auto nearest = closest_to_axis(triangle_at(y, corners), tool);
+    const Vector3<double> separation = nearest.on_triangle.point - tool.position - nearest.fraction * tool.axis;
+    const Vector3<double> u = direction<double>(separation, Vector3<double>::Zero());
+    const Wide wide_u = wide(u), axis = wide(tool.axis);
+    long double distance = std::numeric_limits<long double>::infinity(), size = axis.norm() + tool.radius;
+    for (const Index v : corners) {
+        const Wide corner = seen_from(tool, y, v);
+        distance = (std::min)(distance, wide_u.dot(corner));
+        size = (std::max)(size, corner.norm() + axis.norm());
     }
+    distance = (distance - (std::max)(wide_u.dot(axis), 0.0L)) / (std::max)(wide_u.norm(), 0.5L);
+    constexpr long double rounding = 16 * std::numeric_limits<long double>::epsilon();
+    const double reach = tool.radius + lift;
+    rounding_ = (std::max)(rounding_, static_cast<double>(rounding * size));
+    penetration_ = (std::max)(penetration_, static_cast<double>(reach - distance + rounding * size));
+    radii_[i] = (std::min)(radii_[i], reach);
+    near_.push_back({i, corners, reach, u, static_cast<double>(distance)});
 }
 
 // The normal at the contact point at `y`; adds the work across its gap.
@@ -181,11 +197,11 @@ inline Vector3<double> ContactBounds::take_contact(const ToolPoint& contact, con
     position /= weights;
     const Wide axis = wide(tool.axis);
     const long double length = axis.squaredNorm();
-    const long double along = contact.part() == 2 && length > 0 ? position.dot(axis) / length
-                              : contact.part() == 1             ? 1
-                                                                : 0;
+    long double along = contact.part() == 1 ? 1 : 0;
+    if (contact.part() == 2 && length > 0) along = position.dot(axis) / length;
+    if (contact.part() == vertex_feature && length > 0) along = std::clamp(position.dot(axis) / length, 0.0L, 1.0L);
     const Wide separation = along * axis - position;
-    const auto gap = static_cast<double>(separation.norm() - tool.radius);
+    const auto gap = static_cast<double>(separation.norm() - (tool.radius + contact.lift));
     work_ += contact.multiplier * ((std::max)(gap, 0.0) + rounding_);
     return direction<double>(separation.cast<double>(), contact.normal);
 }
@@ -221,7 +237,7 @@ inline bool ContactBounds::bound_softening(const EquilibriumProblem& problem, co
 inline bool ContactBounds::mark(const EquilibriumProblem& problem, double max_displacement) noexcept {
     std::fill(marks_.begin(), marks_.end(), Mark{});
     for (const auto& candidate : near_) {
-        if (candidate.distance - radius_of(candidate) > max_displacement) continue;
+        if (candidate.distance - candidate.reach > max_displacement) continue;
         for (const Index v : candidate.corners) {
             auto& mark = marks_[at(v)];
             if (problem.fixed(v) || (mark.tool != none && mark.tool != candidate.tool)) return false;
@@ -231,7 +247,8 @@ inline bool ContactBounds::mark(const EquilibriumProblem& problem, double max_di
     }
     for (auto& mark : marks_) mark.middle = direction<double>(mark.middle, Vector3<double>::Zero());
     return std::all_of(contacts_.begin(), contacts_.end(), [&](const ToolPoint& contact) {
-        return std::all_of(contact.corners.begin(), contact.corners.end(),
+        const auto vertices = contact.vertices();
+        return std::all_of(vertices.begin(), vertices.end(),
                            [&](Index v) { return marks_[at(v)].tool == contact.tool; });
     });
 }
@@ -241,8 +258,8 @@ inline bool ContactBounds::narrow(double max_displacement) noexcept {
     constexpr double min_allowed = 0.2;  // of a cosine
     const auto sine = [](double cosine) { return std::sqrt((std::max)(1 - cosine * cosine, 0.0)); };
     for (const auto& candidate : near_) {
-        if (candidate.distance - radius_of(candidate) > max_displacement) continue;
-        const double from_u = (std::min)((candidate.distance - max_displacement) / radius_of(candidate), 1.0);
+        if (candidate.distance - candidate.reach > max_displacement) continue;
+        const double from_u = (std::min)((candidate.distance - max_displacement) / candidate.reach, 1.0);
         for (const Index v : candidate.corners) {
             auto& mark = marks_[at(v)];
             const double u_from_middle = (std::min)(dot(mark.middle, candidate.u), 1.0);

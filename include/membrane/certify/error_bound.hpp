@@ -70,8 +70,7 @@ class ErrorBound {
 
     /// Bounds the error with tools in contact; `rest` is the equilibrium under these constraints. The status is
     /// `not_convex` if a tool may touch a fixed or prescribed vertex, or one that another tool may touch, and
-    /// `unsupported` with a point attachment, or if vertices carry a contact.
-    /// The status is `invalid_input` if a constraint is not valid. Offline.
+    /// `unsupported` with a point attachment. The status is `invalid_input` if a constraint is not valid. Offline.
     /// @throws InvalidInput if a valid constraint does not fit the mesh, such as a contact at a corner that is no
     /// vertex
     template <Real Scalar, class Law, LinearFoundation Volume, StaticConstraint... Constraints>
@@ -170,13 +169,8 @@ ErrorReport ErrorBound<Convexity>::compute(const Equilibrium& rest,
     for (const auto& touch : rest.contacts) {
         if (touch.tool >= scene.tools().size()) return error_;
     }
-    const auto by_vertices = [](const ScenePress& press) { return press.fine_triangles > 0; };
-    if (std::any_of(scene.tools().begin(), scene.tools().end(), by_vertices)) {
-        error_.status = BoundStatus::unsupported;
-        return error_;
-    }
     y_ = rest.x;
-    pressed_.assign(problem_, mesh.triangles(), y_, scene.tools(), rest.contacts);
+    pressed_.assign(problem_, mesh.triangles(), y_, scene.tools(), rest.contacts, detail::carriers_of(scene, mesh));
     evaluate_residuals();
     error_.estimate = distance_;
     enclose();

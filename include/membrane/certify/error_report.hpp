@@ -19,8 +19,7 @@ enum class BoundStatus {
     not_convex,     ///< convexity could not be shown up to the estimated equilibrium
     not_converged,  ///< the iteration ended too far from the equilibrium for a bound
     contact,        ///< a tool touches: the bound needs the `Equilibrium` as an argument
-    unsupported,    ///< a constraint without `describe`, an attached point that shares a corner with another one, or a
-                    ///< contact carried by vertices
+    unsupported,    ///< a constraint without `describe`, or an attached point that shares a corner with another one
     invalid_input,  ///< a number is not finite, an index is not a vertex, or counts do not match
 };
 
