@@ -81,9 +81,9 @@ class ContactBounds {
     struct Near {  // a triangle that a tool may touch, or a vertex that carries the contact, three times
         std::size_t tool;
         std::array<Index, 3> corners;
-        double reach;       // least distance from the axis: the tool's radius and the lift [m]
-        Vector3<double> u;  // from the axis to the triangle
-        double distance;    // [m]
+        double min_distance;  // from the axis that contact leaves: the tool's radius and the lift [m]
+        Vector3<double> u;    // from the axis to the triangle
+        double distance;      // [m]
     };
     struct Mark {  // of a vertex
         std::size_t tool = none;
@@ -148,10 +148,10 @@ inline void ContactBounds::assign(const EquilibriumProblem& problem, const Trian
 
 inline void ContactBounds::find_near(std::size_t i, const Triangles& triangles, const Points<double>& y,
                                      const Tool<double>& tool, const ContactVertices* vertices) {
-    const double reach = tool.radius + (vertices == nullptr ? 0 : vertices->largest_lift(tool.radius));
+    const double radius = tool.radius + (vertices == nullptr ? 0 : vertices->largest_lift(tool.radius));
     for (const auto& of_triangle : triangles.colwise()) {
         const std::array<Index, 3> corners{of_triangle[0], of_triangle[1], of_triangle[2]};
-        if (detail::is_far(triangle_at(y, corners), tool, 1.25 * reach)) continue;
+        if (detail::is_far(triangle_at(y, corners), tool, 1.25 * radius)) continue;
         for (const Index v : vertices == nullptr ? std::span<const Index>() : std::span<const Index>(corners)) {
             if (vertices->carries(v, tool.radius)) add_near(i, {v, v, v}, vertices->lift(v, tool.radius), y, tool);
         }
@@ -177,11 +177,11 @@ inline void ContactBounds::add_near(std::size_t i, const std::array<Index, 3>& c
     }
     distance = (distance - (std::max)(wide_u.dot(axis), 0.0L)) / (std::max)(wide_u.norm(), 0.5L);
     constexpr long double rounding = 16 * std::numeric_limits<long double>::epsilon();
-    const double reach = tool.radius + lift;
+    const double min_distance = tool.radius + lift;
     rounding_ = (std::max)(rounding_, static_cast<double>(rounding * size));
-    penetration_ = (std::max)(penetration_, static_cast<double>(reach - distance + rounding * size));
-    radii_[i] = (std::min)(radii_[i], reach);
-    near_.push_back({i, corners, reach, u, static_cast<double>(distance)});
+    penetration_ = (std::max)(penetration_, static_cast<double>(min_distance - distance + rounding * size));
+    radii_[i] = (std::min)(radii_[i], min_distance);
+    near_.push_back({i, corners, min_distance, u, static_cast<double>(distance)});
 }
 
 // The normal at the contact point at `y`; adds the work across its gap.
@@ -237,7 +237,7 @@ inline bool ContactBounds::bound_softening(const EquilibriumProblem& problem, co
 inline bool ContactBounds::mark(const EquilibriumProblem& problem, double max_displacement) noexcept {
     std::fill(marks_.begin(), marks_.end(), Mark{});
     for (const auto& candidate : near_) {
-        if (candidate.distance - candidate.reach > max_displacement) continue;
+        if (candidate.distance - candidate.min_distance > max_displacement) continue;
         for (const Index v : candidate.corners) {
             auto& mark = marks_[at(v)];
             if (problem.fixed(v) || (mark.tool != none && mark.tool != candidate.tool)) return false;
@@ -258,8 +258,8 @@ inline bool ContactBounds::narrow(double max_displacement) noexcept {
     constexpr double min_allowed = 0.2;  // of a cosine
     const auto sine = [](double cosine) { return std::sqrt((std::max)(1 - cosine * cosine, 0.0)); };
     for (const auto& candidate : near_) {
-        if (candidate.distance - candidate.reach > max_displacement) continue;
-        const double from_u = (std::min)((candidate.distance - max_displacement) / candidate.reach, 1.0);
+        if (candidate.distance - candidate.min_distance > max_displacement) continue;
+        const double from_u = (std::min)((candidate.distance - max_displacement) / candidate.min_distance, 1.0);
         for (const Index v : candidate.corners) {
             auto& mark = marks_[at(v)];
             const double u_from_middle = (std::min)(dot(mark.middle, candidate.u), 1.0);
