@@ -178,6 +178,31 @@ TEST_CASE("the tracker lists each vertex that carries the contact once, and the 
     CHECK(by_both > 0);
 }
 
+TEST_CASE("drawn with its drawn radius, a tool has no triangle of the surface inside it", "[contact]") {
+    const Mesh mesh = test::graded_sphere(5e-3, 4, 3);
+    const membrane::AabbTree<double> tree(mesh);
+    test::Random random(5);
+    int smaller = 0;
+    for (int i = 0; i < cases(80); ++i) {
+        CAPTURE(i);
+        const double radius = random.number(0.3e-3, 2e-3);
+        const Point towards = random.unit_vector();
+        membrane::Tool<double> tool{.position = (5e-3 + random.number(0.7, 1.01) * radius) * towards, .radius = radius};
+        if (random.chance(0.3)) tool.axis = 4e-3 * (towards + 0.5 * random.unit_vector());
+        Tracker tracker(mesh, {.fine_triangles = 0.5});
+        const auto contact = tracker.update(tree, mesh.positions(), tool);
+        double nearest = radius;
+        for (const auto& corners : mesh.triangles().colwise()) {
+            const auto distance = closest_to_axis(membrane::triangle_at(mesh.positions(), corners), tool).on_triangle;
+            nearest = std::min(nearest, std::sqrt(distance.squared_distance));
+        }
+        const double drawn = drawn_radius(tool, contact, mesh.positions());
+        REQUIRE(drawn == (contact.touching() ? nearest : radius));
+        smaller += drawn < radius;
+    }
+    CHECK(smaller > 0);
+}
+
 TEST_CASE("fine_triangles out of range is refused", "[contact]") {
     const auto mesh = membrane::icosphere<double>({});
     const auto of = [&](double fine) { return test::refusal([&] { Tracker(mesh, {.fine_triangles = fine}); }); };

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <sstream>
 #include <vector>
 
 #include <membrane/accuracy/equilibrium.hpp>
@@ -137,6 +138,41 @@ TEST_CASE("the force of a ball converges with the mesh, from coarse ones on", "[
         CHECK(error < bars[static_cast<std::size_t>(subdivisions - 3)]);
         CHECK(force_on(subdivisions, 0) / continuum - 1 > 5 * error);  // by faces
     }
+}
+
+// A vertex of an icosphere has 5 or 6 triangles: with a foundation per area the ripple is that of the contact.
+TEST_CASE("as a ball slides over vertices and faces, the force by vertices has about the ripple by faces",
+          "[contact]") {
+    std::ostringstream table;
+    for (int subdivisions = 3; subdivisions <= cases(4, 6); ++subdivisions) {
+        const auto mesh = icosphere<double>({.radius = body_radius, .subdivisions = subdivisions});
+        const Field<double> stiffness = foundation_of(mesh);
+        for (const double depth : {0.2e-3, 0.5e-3, 1e-3}) {
+            table << mesh.vertex_count() << " vertices, " << 1e3 * depth << " mm deep: mean and ripple [mN]";
+            std::array<double, 2> ripples{};
+            for (const double fine : {0.0, 0.5}) {
+                Scene<double> scene(mesh, stiffness, fine, {.layers = 12, .sweeps = 12});
+                double low = 1, high = 0, sum = 0;
+                const int held = 60, slid = cases(60, 260);
+                for (int t = 1; t <= held + slid; ++t) {
+                    const double edges = 2.0 * std::max(t - held, 0) / slid;  // slid by two edges
+                    const double angle = edges * 1.1 / (1 << subdivisions);
+                    const double pressed = depth * std::min(t, 40) / 40;
+                    const double force = norm(scene.press_at(pressed, angle).reactions[0]);
+                    if (t < held) continue;
+                    low = std::min(low, force);
+                    high = std::max(high, force);
+                    sum += force / (slid + 1);
+                }
+                table << (fine == 0 ? ", by faces " : ", by vertices ") << 1e3 * sum << ' ' << 1e3 * (high - low);
+                ripples[fine == 0 ? 0 : 1] = high - low;
+            }
+            table << "\n";
+            CAPTURE(table.str());
+            CHECK(ripples[1] < 1.5 * ripples[0]);
+        }
+    }
+    WARN(table.str());
 }
 
 TEST_CASE("on a graded mesh the force does not jump where faces take over from the vertices", "[contact]") {

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <span>
+#include <type_traits>
 
 #include <membrane/contact/contact_point.hpp>
 #include <membrane/core/check.hpp>
@@ -76,6 +79,20 @@ struct Contact {
         return phase == ContactPhase::began || phase == ContactPhase::ongoing;
     }
 };
+
+/// The radius with which `tool` may be drawn so that no triangle of its contact, drawn at `x` (3 x V [m]) after a step,
+/// is inside it: its own, or less where vertices carry the contact and the faces between them cut into it [m]. Online.
+/// Cost: linear in the triangles of the contact.
+template <Real Scalar>
+[[nodiscard]] Scalar drawn_radius(const Tool<Scalar>& tool, const Contact<Scalar>& contact,
+                                  const std::type_identity_t<ConstPointsRef<Scalar>>& x) noexcept {
+    Scalar square = tool.radius * tool.radius;
+    for (const auto& listed : contact.patch.triangles) {
+        const auto nearest = closest_to_axis(triangle_at(x, listed.corners), tool);
+        square = (std::min)(square, nearest.on_triangle.squared_distance);
+    }
+    return (std::min)(tool.radius, std::sqrt(square));
+}
 
 /// Whether the numbers of a touching contact are finite. The caller checks its vertices against the mesh.
 template <Real Scalar>
