@@ -355,6 +355,18 @@ TEST_CASE("the time is that of the ticks in which a force is felt, by the given 
     CHECK(scene.play(scene.stroke(), references).time < 1);
 }
 
+TEST_CASE("trials by vertices compare with equilibria by vertices") {
+    const Scene<double> scene;
+    const ToolTrajectory<double> stroke(scene.mesh, scene.tools, dt, {.fine_triangles = 1});
+    const auto references = equilibria(scene.mesh, scene.network, scene.foundation, stroke, 5);
+    const auto by_faces = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke(), 5);
+    const SolverOptions<double> most{.layers = unlimited, .sweeps = 60};
+    CHECK(scene.play(stroke, references, most).force_error < 1e-4);
+    CHECK(scene.play(scene.stroke(), references, most).force_error > 0.05);
+    REQUIRE(references[3].tick == by_faces[3].tick);
+    CHECK(references[3].force < 0.8 * by_faces[3].force);  // flat faces hold the membrane off the tool
+}
+
 TEST_CASE("a step that is refused ends the trial") {
     const Scene<double> scene;
     const auto references = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke(), 10);
@@ -373,6 +385,8 @@ TEST_CASE("a stroke or a trial that makes no sense is refused") {
           "ToolTrajectory: the history must have a tick, got 0");
     CHECK(refusal([&] { ToolTrajectory(scene.mesh, one, 0); }) ==
           "ToolTrajectory: dt of the history must be finite and positive [s], got 0");
+    CHECK(refusal([&] { ToolTrajectory(scene.mesh, one, dt, {.fine_triangles = 2}); }) ==
+          "ContactTracker: fine_triangles must be from 0 to 1 [tool radii], got 2");
     auto tools = scene.tools;
     tools[7].radius = -1;
     CHECK(refusal([&] { ToolTrajectory(scene.mesh, tools, dt); }) ==

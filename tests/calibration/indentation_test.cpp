@@ -135,6 +135,27 @@ TEST_CASE("Forces of an indentation are those that Newton's method of the tests 
     }
 }
 
+TEST_CASE("By vertices, forces are those of the equilibria by vertices, and a fit finds the constants") {
+    const auto mesh = sphere(3);
+    const TrackerOptions fine{.fine_triangles = 0.5};
+    const Indentation indentation(mesh, tip(), down, linear_on(mesh), fine),
+        by_faces(mesh, tip(), down, linear_on(mesh));
+    const std::vector truth{40.0, 8.0};
+    const auto at = depths(5, 1.5e-3);
+    const auto table = table_of(indentation, truth, at);
+    const auto [network, foundation] = linear_on(mesh)(truth);
+    auto tool = indentation.touching();
+    tool.position += at.back() * down;
+    ContactTracker<double> tracker(mesh, fine);
+    const auto contact = tracker.update(AabbTree<double>(mesh), mesh.positions(), tool);
+    const auto rest = equilibrium(mesh.positions(), mesh, network, foundation, {}, press(tool, contact));
+    CHECK(table.force.back() == Approx(-down.dot(rest.reactions[0])).epsilon(1e-9));
+    CHECK(by_faces(truth, at).back() > 1.1 * table.force.back());
+    const auto found = fit(table, {20, 20}, indentation);
+    CHECK(found.converged);
+    for (std::size_t k = 0; k < 2; ++k) CHECK(found.constants[k] == Approx(truth[k]).epsilon(1e-4));
+}
+
 TEST_CASE("Depths may come in any order and repeat, and without touch there is no force") {
     const auto mesh = sphere(1);
     const Indentation indentation(mesh, tip(), down, linear_on(mesh));

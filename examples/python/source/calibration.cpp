@@ -25,10 +25,11 @@ struct NoBuilder {
 /// `Indentation` with a function of Python that returns network and foundation.
 class Indentation {
   public:
-    Indentation(const Mesh& mesh, const Tool& tool, const Vector& direction, py::object build)
+    Indentation(const Mesh& mesh, const Tool& tool, const Vector& direction, py::object build, double fine_triangles)
         : mesh_(mesh),
           tool_(tool),
-          touching_(membrane::Indentation(mesh, tool, direction, NoBuilder()).touching()),
+          tracker_{.fine_triangles = fine_triangles},
+          touching_(membrane::Indentation(mesh, tool, direction, NoBuilder(), tracker_).touching()),
           direction_(direction),
           build_(std::move(build)) {}
 
@@ -42,7 +43,7 @@ class Indentation {
         check_fit("Indentation", mesh_.vertex_count(), mesh_.vertex_count(), network, foundation);
         const auto press_with = [&](const auto& springs, const auto& volume) {
             const auto build = [&](Numbers) { return std::pair(springs, volume); };
-            return membrane::Indentation(mesh_, tool_, direction_, build)(constants, depths);
+            return membrane::Indentation(mesh_, tool_, direction_, build, tracker_)(constants, depths);
         };
         return unlocked("Indentation", network, foundation, press_with);
     }
@@ -51,7 +52,9 @@ class Indentation {
 
   private:
     const Mesh& mesh_;
-    Tool tool_, touching_;
+    Tool tool_;
+    membrane::TrackerOptions tracker_;
+    Tool touching_;
     Vector direction_;
     py::object build_;
 };
@@ -72,8 +75,10 @@ class Indentation {
 
 void bind_calibration(py::module_& module) {
     py::class_<Indentation>(module, "Indentation", doc("Indentation"))
-        .def(py::init<const Mesh&, const Tool&, const Vector&, py::object>(), py::arg("mesh"), py::arg("tool"),
-             py::arg("direction"), py::arg("build"), py::keep_alive<1, 2>(), doc("Indentation::Indentation"))
+        .def(py::init<const Mesh&, const Tool&, const Vector&, py::object, double>(), py::arg("mesh"), py::arg("tool"),
+             py::arg("direction"), py::arg("build"),
+             py::arg("fine_triangles") = membrane::TrackerOptions().fine_triangles, py::keep_alive<1, 2>(),
+             doc("Indentation::Indentation"))
         .def(
             "__call__",
             [](const Indentation& self, const std::vector<double>& constants, const std::vector<double>& depths) {

@@ -77,10 +77,12 @@ void bind_results(py::module_& module) {
 void bind_settings(py::module_& module) {
     bind_results(module);
     py::class_<Path>(module, "ToolTrajectory", doc("ToolTrajectory"))
-        .def(py::init([](const Mesh& mesh, const std::vector<Tool>& tools, double dt) {
-                 return Path{Trajectory(mesh, tools, dt), mesh.vertex_count()};
+        .def(py::init([](const Mesh& mesh, const std::vector<Tool>& tools, double dt, double fine_triangles) {
+                 return Path{Trajectory(mesh, tools, dt, {.fine_triangles = fine_triangles}), mesh.vertex_count()};
              }),
-             py::arg("mesh"), py::arg("tools"), py::arg("dt"), doc("ToolTrajectory::ToolTrajectory"))
+             py::arg("mesh"), py::arg("tools"), py::arg("dt"),
+             py::arg("fine_triangles") = membrane::TrackerOptions().fine_triangles,
+             doc("ToolTrajectory::ToolTrajectory"))
         .def_property_readonly(
             "ticks", [](const Path& self) { return self.trajectory.ticks(); }, doc("ToolTrajectory::ticks"))
         .def_property_readonly(

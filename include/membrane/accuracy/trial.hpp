@@ -85,10 +85,11 @@ concept CheckedLoadHistory = detail::check_load_history<History, Scalar>();
 template <Real Scalar>
 class ToolTrajectory {
   public:
-    /// A tool for each tick of `dt` [s], in the coordinates of the mesh.
-    /// @throws InvalidInput for no tools, one that is not valid, or a `dt` that is not finite and positive
+    /// A tool for each tick of `dt` [s], in the coordinates of the mesh; `tracker` are the options of its tracker.
+    /// @throws InvalidInput for no tools, one that is not valid, a `dt` that is not finite and positive, or an option
+    /// out of its range
     ToolTrajectory(const TriangleMesh<Scalar>& mesh, const std::type_identity_t<std::span<const Tool<Scalar>>>& tools,
-                   std::type_identity_t<Scalar> dt);
+                   std::type_identity_t<Scalar> dt, const TrackerOptions& tracker = {});
 
     /// Number of tools.
     [[nodiscard]] Index ticks() const noexcept { return static_cast<Index>(tools_.size()); }
@@ -302,8 +303,8 @@ class MotionRange {
 template <Real Scalar>
 ToolTrajectory<Scalar>::ToolTrajectory(const TriangleMesh<Scalar>& mesh,
                                        const std::type_identity_t<std::span<const Tool<Scalar>>>& tools,
-                                       std::type_identity_t<Scalar> dt)
-    : tools_(tools.begin(), tools.end()), dt_(dt), tree_(mesh), tracker_(mesh), grasper_(mesh) {
+                                       std::type_identity_t<Scalar> dt, const TrackerOptions& tracker)
+    : tools_(tools.begin(), tools.end()), dt_(dt), tree_(mesh), tracker_(mesh, tracker), grasper_(mesh) {
     detail::check_history<Scalar>("ToolTrajectory", *this);
     for (std::size_t tick = 0; tick < tools_.size(); ++tick) {
         if (!is_valid(tools_[tick])) {

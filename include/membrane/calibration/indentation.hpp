@@ -38,11 +38,12 @@ template <Real Scalar, MembraneBuilder Build>
 class Indentation {
   public:
     /// `tool` starts outside and moves along `direction`, of any length. Depth is its displacement beyond first contact
-    /// with the undeformed surface [m]. `mesh` must outlive this.
+    /// with the undeformed surface [m]. `tracker` are the options of its tracker. `mesh` must outlive this.
     /// @throws InvalidInput for a tool that is invalid, has no radius, does not start outside or misses the surface,
-    /// and for a direction that is zero or not finite. Cost: about ten times O(F).
+    /// for a direction that is zero or not finite, and for an option out of its range. Cost: about ten times O(F).
     Indentation(const TriangleMesh<Scalar>& mesh, const Tool<Scalar>& tool,
-                const std::type_identity_t<Vector3<Scalar>>& direction, Build build);
+                const std::type_identity_t<Vector3<Scalar>>& direction, Build build,
+                const TrackerOptions& tracker = {});
 
     /// Force of the membrane on the tool at each depth, against `direction` [N]; NaN from the first depth on at which
     /// no equilibrium was found. Depths may be in any order; each solution starts from that of the next smaller depth.
@@ -92,8 +93,9 @@ inline constexpr std::string_view indentation_name = "Indentation";
 
 template <Real Scalar, MembraneBuilder Build>
 Indentation<Scalar, Build>::Indentation(const TriangleMesh<Scalar>& mesh, const Tool<Scalar>& tool,
-                                        const std::type_identity_t<Vector3<Scalar>>& direction, Build build)
-    : mesh_(&mesh), tool_(tool), direction_(direction), build_(std::move(build)), tree_(mesh), tracker_(mesh) {
+                                        const std::type_identity_t<Vector3<Scalar>>& direction, Build build,
+                                        const TrackerOptions& tracker)
+    : mesh_(&mesh), tool_(tool), direction_(direction), build_(std::move(build)), tree_(mesh), tracker_(mesh, tracker) {
     constexpr auto name = detail::indentation_name;
     if (!is_valid(tool) || !(tool.radius > 0)) {
         refuse(name, "the tool must be finite and have a radius [m], got one that is not or has none");
