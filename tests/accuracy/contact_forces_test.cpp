@@ -43,7 +43,7 @@ TEST_CASE("at rest the contact points push on each vertex as in the equilibrium"
         const VirtualVolumeSprings volume(mesh, {.stiffness = 8.0, .damping = 0.02});
         QuasiStaticSolver solver(network, {.layers = unlimited, .sweeps = 4, .force_tolerance = 1e-9});
         AabbTree tree(mesh);
-        ContactTracker tracker(mesh);
+        ContactTracker tracker(mesh, {.fine_triangles = 0});
         Points<double> x = mesh.positions();
         const Vector3<double> out = random.unit_vector();
         Tool<double> tool{.radius = random.number(0.001, 0.004)};

@@ -158,6 +158,10 @@ TEST_CASE("a scene refuses what is not valid", "[equilibrium_scene]") {
     CHECK(refused(press(Tool<double>{}, contact)) ==
           "equilibrium: radius of the contact of constraint 5 must be finite and positive [m], got 0");
     contact = contact_above();
+    contact.patch.fine_triangles = 2;
+    CHECK(refused(press(Tool<double>{}, contact)) ==
+          "equilibrium: fine_triangles of the contact of constraint 5 must be from 0 to 1 [tool radii], got 2");
+    contact = contact_above();
     contact.normal[2] = not_a_number;
     CHECK(refused(press(Tool<double>{}, contact)) ==
           "equilibrium: z of the contact's normal of constraint 5 must be finite [1], got nan");

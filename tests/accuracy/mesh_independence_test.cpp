@@ -85,7 +85,7 @@ struct Sphere {
     double force(double radius, double depth, Over place, double tool_radius) const {
         const Point out = direction(place);
         AabbTree tree(mesh);
-        ContactTracker tracker(mesh);
+        ContactTracker tracker(mesh, {.fine_triangles = 0});
         QuasiStaticSolver solver(network,
                                  {.layers = unlimited, .sweeps = 4, .force_tolerance = 1e-4 * per_depth * depth});
         Points<double> x = mesh.positions();
@@ -120,7 +120,7 @@ struct Elastic {
         const double pressing = membrane::tool_radius(radius, mean_edge(mesh));
         const Point out = Point(0.3, 0.5, 0.81).normalized();
         AabbTree tree(mesh);
-        ContactTracker tracker(mesh);
+        ContactTracker tracker(mesh, {.fine_triangles = 0});
         auto x = mesh.positions();
         double held = 0;
         for (int i = 0; i <= 2; ++i) {

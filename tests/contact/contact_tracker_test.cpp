@@ -76,7 +76,7 @@ TEST_CASE("the tracker agrees with a search of the whole surface along random tr
     const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 3});
     const double edge = membrane::LocalSurface<double>(mesh).mean_edge();
     AabbTree<double> tree(mesh);
-    ContactTracker<double> tracker(mesh);
+    ContactTracker<double> tracker(mesh, {.fine_triangles = 0});
     long contact_ticks = 0, agreements = 0;
     for (int seed = 1; seed <= cases(2'000, 100'000); ++seed) {
         test::Random random(static_cast<std::uint64_t>(seed));
@@ -242,7 +242,7 @@ TEST_CASE("a tool that a surface has not yielded to stays behind it, until it do
 TEST_CASE("a contact begins, goes on and ends once, with the depth against the surface without the tool") {
     const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 3});
     const AabbTree<double> tree(mesh);
-    ContactTracker<double> tracker(mesh);
+    ContactTracker<double> tracker(mesh, {.fine_triangles = 0});
     const Points<double>& x = mesh.positions();
     const double radius = 0.1;
     int began = 0, ended = 0;
@@ -559,7 +559,7 @@ TEMPLATE_TEST_CASE("the contact points are those of all triangles within reach, 
         Tool<S> tool{.radius = static_cast<S>(random.number(0.0, 0.2))};
         tool.position = static_cast<S>(random.number(0.9, 1.1)) * random.unit_vector().cast<S>();
         if (seed % 2 == 0) tool.axis = static_cast<S>(random.number(0.1, 1.5)) * random.unit_vector().cast<S>();
-        ContactTracker<S> tracker(mesh);
+        ContactTracker<S> tracker(mesh, {.fine_triangles = 0});
         const auto contact = tracker.update(tree, mesh.positions(), tool);
         if (!contact.touching()) continue;
         tunnelled += contact.patch.tunnelled ? 1 : 0;

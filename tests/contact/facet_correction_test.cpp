@@ -61,7 +61,7 @@ struct Disc {
         for (int i = 0; i < 30; ++i) {
             auto pressed = ball;
             pressed.position += offset;
-            membrane::ContactTracker<double> tracker(mesh);
+            membrane::ContactTracker<double> tracker(mesh, {.fine_triangles = 0});
             const auto contact = tracker.update(tree, mesh.positions(), pressed);
             const auto rest = membrane::equilibrium(x, mesh, tissue, nothing, {}, press(pressed, contact));
             REQUIRE(rest.converged);
@@ -271,7 +271,7 @@ TEMPLATE_TEST_CASE("a ball that slides in the loop has a force that does not dep
     const auto spread = [&](bool corrected) {
         membrane::QuasiStaticSolver solver(tissue, {.layers = membrane::unlimited, .sweeps = 8});
         membrane::AabbTree<S> tree(mesh);
-        membrane::ContactTracker<S> tracker(mesh);
+        membrane::ContactTracker<S> tracker(mesh, {.fine_triangles = 0});
         Points<S> x = mesh.positions();
         membrane::Vector3<S> offset = membrane::Vector3<S>::Zero();
         double least = 1, most = 0;

@@ -91,7 +91,7 @@ namespace {
 Vector3<double> point_held(const TriangleMesh<double>& mesh, const Points<double>& x, const Tool<double>& tool) {
     AabbTree<double> tree(mesh);
     tree.refit(x);
-    ContactTracker<double> tracker(mesh);
+    ContactTracker<double> tracker(mesh, {.fine_triangles = 0});
     Grasper<double> grasper(mesh);
     const auto grasp = grasper.update(tracker.update(tree, x, tool), x, tool);
     REQUIRE(grasp.holding());

@@ -165,7 +165,7 @@ struct Run {
     QuasiStaticSolver<double> solver;
     AabbTree<double> tree{scene.mesh};
     // A second fold that comes to the tool is known at once.
-    ContactTracker<double> tracker{scene.mesh, {.full_query_interval = 1}},
+    ContactTracker<double> tracker{scene.mesh, {.full_query_interval = 1, .fine_triangles = 0}},
         tracker_2{scene.mesh, {.full_query_interval = 1}};
     Grasper<double> grasper{scene.mesh};
     Points<double> x = scene.mesh.positions();

@@ -267,7 +267,7 @@ TEST_CASE("beside a rim a tool that stands still feels a force that does, howeve
                 if (i > 400) low = std::min(low, force), high = std::max(high, force);
             }
             CHECK(high - low <= 1e-3 * high);
-            CHECK(high > 0.02);
+            CHECK(high > 0.015);
             forces[predict ? 1 : 0] = high;
         }
         ++places;
@@ -427,7 +427,7 @@ TEST_CASE(
     "two equal balls that overlap on both sides of a vertex penetrate by half of the overlap, with opposite forces") {
     test::Random random(1);
     PinnedSheet scene(random, 12);
-    ContactTracker<double> above(scene.mesh), below(scene.mesh);
+    ContactTracker<double> above(scene.mesh, {.fine_triangles = 0}), below(scene.mesh, {.fine_triangles = 0});
     constexpr double radius = 2e-3, overlap = 0.1e-3;
     StepReport<double> report;
     for (int i = 0; i < 300; ++i) {

@@ -796,7 +796,7 @@ TEST_CASE("a tool that holds back a load on the membrane has its force, and come
     for (const double size : {0.0, 0.005, 0.02, 0.1}) {
         CAPTURE(size);
         QuasiStaticSolver<double> solver(network, {.layers = unlimited, .sweeps = 4, .force_tolerance = 1e-7});
-        ContactTracker<double> tracker(mesh);
+        ContactTracker<double> tracker(mesh, {.fine_triangles = 0});
         Points<double> x = mesh.positions();
         tree.refit(x);
         for (int tick = 0; tick < 600; ++tick) {

@@ -56,7 +56,7 @@ struct Drag : test::SoftDisc<S> {
     Settings settings;
     QuasiStaticSolver<S> solver{network, {.layers = unlimited, .sweeps = settings.sweeps}};
     AabbTree<S> tree{mesh};
-    ContactTracker<S> tracker{mesh};
+    ContactTracker<S> tracker{mesh, {.fine_triangles = 0}};  // many points
     ToolFriction<S> friction{{.coefficient = settings.friction}};
     Points<S> x = mesh.positions();
     Tool<S> tool{.axis = settings.axis.cast<S>(), .radius = S(settings.radius)};

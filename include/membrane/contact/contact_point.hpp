@@ -32,7 +32,7 @@ struct ContactPoint {
     bool by_plane = false;  ///< whether the tool is kept on its side of the triangle's plane, not of the triangle only
     Scalar side = 0;        ///< of the triangle, 1 or -1, if the tool is over its interior; 0: as in the last step
     Scalar gap = 0;         ///< signed distance of the tool when the point was found [m]; negative in penetration
-    Scalar lift = 0;        ///< least gap of a vertex that carries the contact [m], see `ContactVertices`
+    Scalar lift = 0;        ///< least gap: above 0 for a vertex that carries the contact, see `ContactVertices` [m]
 
     /// The corners that carry the point: all, or the vertex.
     [[nodiscard]] std::span<const Index> vertices() const& noexcept {

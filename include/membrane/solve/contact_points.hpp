@@ -421,13 +421,15 @@ template <std::size_t corners, Real Scalar>
     return true;
 }
 
-/// Takes the multipliers of the vertices with walls, and places the walls at the current positions. The absolute
-/// changes of their forces since the last call, those that close a gap included [N].
+/// Takes the multipliers of the vertices with walls, and places the walls at the current positions. Beside faces, whose
+/// passes move the same vertices, solves these too. The absolute changes of their forces since the last call, those that
+/// close a gap included [N].
 template <Real Scalar>
 [[nodiscard]] MEMBRANE_NOINLINE MEMBRANE_FLATTEN Lanes<Scalar> follow_vertices(VertexRows<Scalar>& rows,
                                                                                ContactState<Scalar>& contacts,
                                                                                const ToolShape<Scalar>& tool,
-                                                                               ContactPack<Scalar>& pack) noexcept {
+                                                                               ContactPack<Scalar>& pack,
+                                                                               ContactPass<Scalar>& pass) noexcept {
     using Wide = Lanes<Scalar>;
     const Wide now = Wide::of([&](std::size_t i) {
         return i < pack.size ? rows.multiplier[static_cast<std::size_t>(row_at(pack.corner[0][i]))] : Scalar(0);
@@ -435,6 +437,10 @@ template <Real Scalar>
     const Wide change = abs(now - pack.load.force);
     pack.load.force = pack.applied.force = now;  // the updates have changed the rows of forces
     auto located = located_pack<1>(rows, contacts, tool, pack);
+    const auto acts = (pack.used > 0) & ((now > 0) | (located.gap < 0));
+    if (!rows.only_walls && any(acts)) {
+        static_cast<void>(solve(rows, acts, response_of<1>(rows, located.support, pack), located, pack, pass));
+    }
     add_forces<1>(rows, contacts, pack);
     place_wall(rows, pack);
     const Wide& compliance = located.corner[0].extra;
@@ -450,7 +456,7 @@ template <std::size_t corners, Real Scalar>
     using Wide = Lanes<Scalar>;
     if constexpr (corners == 1) {
         if (pack.has_walls) {
-            const Wide change = follow_vertices(rows, contacts, tool, pack);
+            const Wide change = follow_vertices(rows, contacts, tool, pack, pass);
             if (pack.has_walls) return change;
         }
     }
