@@ -421,8 +421,8 @@ template <std::size_t corners, Real Scalar>
     return true;
 }
 
-/// Takes the multipliers of the vertices with walls, beside faces, which move the same vertices, solves them too, and
-/// places the walls at the current positions. The absolute changes of their forces, those that close a gap included [N].
+/// Takes the multipliers of the vertices with walls, and places the walls at the current positions; beside faces, which
+/// move the same vertices, solves them, too. The absolute changes of their forces, those that close a gap included [N].
 template <Real Scalar>
 [[nodiscard]] MEMBRANE_NOINLINE MEMBRANE_FLATTEN Lanes<Scalar> follow_vertices(VertexRows<Scalar>& rows,
                                                                                ContactState<Scalar>& contacts,
