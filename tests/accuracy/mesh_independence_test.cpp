@@ -204,7 +204,7 @@ TEST_CASE("a step that has come to rest holds a tissue with the force of its equ
     const Sphere sphere(3);
     const double radius = 0.3 * R, depth = 0.15 * R;
     AabbTree tree(sphere.mesh);
-    ContactTracker tracker(sphere.mesh);
+    ContactTracker tracker(sphere.mesh, {.fine_triangles = 0});
     const Tool<double> tool{.position = (R + radius - depth) * sphere.direction(Over::face), .radius = radius};
     Tool<double> above = tool;
     above.position *= 1.2;

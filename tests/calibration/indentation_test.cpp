@@ -137,9 +137,9 @@ TEST_CASE("Forces of an indentation are those that Newton's method of the tests 
 
 TEST_CASE("By vertices, forces are those of the equilibria by vertices, and a fit finds the constants") {
     const auto mesh = sphere(3);
-    const TrackerOptions fine{.fine_triangles = 0.5};
+    const TrackerOptions fine{.fine_triangles = 0.5}, faces{.fine_triangles = 0};
     const Indentation indentation(mesh, tip(), down, linear_on(mesh), fine),
-        by_faces(mesh, tip(), down, linear_on(mesh));
+        by_faces(mesh, tip(), down, linear_on(mesh), faces);
     const std::vector truth{40.0, 8.0};
     const auto at = depths(5, 1.5e-3);
     const auto table = table_of(indentation, truth, at);
