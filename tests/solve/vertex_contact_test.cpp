@@ -123,6 +123,32 @@ TEST_CASE("with contact by vertices, steps converge to Newton's equilibrium", "[
     }
 }
 
+// Around a deep contact triangles stretch to the size of the ball.
+TEST_CASE("a ball does not pass between the vertices, however deep it is", "[contact]") {
+    test::Random random(6);
+    for (int i = 0; i < cases(4, 24); ++i) {
+        const double size = random.number(0.4, 0.7),
+                     radius = 1.4e-3 / std::sqrt(3.0) / size;  // of triangles over radius
+        const double depth = random.number(1.75, 3.0) * radius, slide = random.chance(0.5) ? 0.4 : 0.0;
+        CAPTURE(i, size, depth, slide);
+        Scene<double> scene(3, random.chance(0.5) ? 1 : 0.5, {.layers = unlimited, .sweeps = 4});
+        const Point from = random.unit_vector(), to = from.cross(random.unit_vector()).normalized();
+        StepReport<double> report;
+        bool passed = false;
+        for (int t = 1; t <= 600 && !(t > 300 && report.converged); ++t) {
+            const double angle = slide * std::clamp((t - 120) / 100.0, 0.0, 1.0);
+            const Point outward = std::cos(angle) * from + std::sin(angle) * to;
+            report = scene.press_towards(outward, depth * std::min(t, 100) / 100, radius);
+            REQUIRE(report.status == StepStatus::advanced);
+            passed = passed || scene.contact.patch.tunnelled;
+        }
+        CHECK_FALSE(passed);
+        CHECK(report.converged);
+        CHECK(scene.contact.gap > -0.51 * radius);
+        CHECK(scene.overlap() < 1e-5);
+    }
+}
+
 TEST_CASE("the force of a ball converges with the mesh, from coarse ones on", "[contact]") {
     const auto force_on = [](int subdivisions, double fine_triangles) {
         Scene<double> scene(subdivisions, fine_triangles, {.layers = unlimited, .sweeps = 20});

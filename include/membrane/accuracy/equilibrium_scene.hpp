@@ -197,9 +197,8 @@ template <Real Scalar>
     if (std::none_of(tools.begin(), tools.end(), by_vertices)) return {};
     const LocalSurface<Scalar> surface(mesh);
     std::vector<ContactVertices> carriers;
-    for (const auto& pressing : tools) {
-        carriers.emplace_back(surface, ConstPointsRef<Scalar>(mesh.positions()), pressing.fine_triangles);
-    }
+    const ConstPointsRef<Scalar> rest(mesh.positions());
+    for (const auto& pressing : tools) carriers.emplace_back(surface, rest, pressing.fine_triangles);
     return carriers;
 }
 

@@ -117,7 +117,8 @@ inline std::vector<ToolPoint> tool_points(const Triangles& triangles, const Poin
                 point.gap -= point.lift;
                 if (!point.normal.isZero(0) && point.gap <= max_distance) points.push_back(point);
             }
-            if (vertices != nullptr && vertices->carry_alone(corners, tool.radius)) continue;
+            if (vertices != nullptr && !vertices->may_touch(corners, tool.radius, distance_from_axis(triangle, tool)))
+                continue;
             for (int feature = 0; feature < feature_pairs(tool); ++feature) {
                 auto point = contact_point(f, corners, triangle, tool, feature, tool.radius);
                 if (!point || point->normal.isZero(0)) continue;

@@ -86,8 +86,7 @@ template <Real Scalar>
 class ToolTrajectory {
   public:
     /// A tool for each tick of `dt` [s], in the coordinates of the mesh; `tracker` are the options of its tracker.
-    /// @throws InvalidInput for no tools, one that is not valid, a `dt` that is not finite and positive, or an option
-    /// out of its range
+    /// @throws InvalidInput for no tools, an invalid one, a `dt` not finite and positive, or an option out of range
     ToolTrajectory(const TriangleMesh<Scalar>& mesh, const std::type_identity_t<std::span<const Tool<Scalar>>>& tools,
                    std::type_identity_t<Scalar> dt, const TrackerOptions& tracker = {});
 

@@ -105,7 +105,7 @@ class ContactBounds {
     bool mark(const EquilibriumProblem& problem, double max_displacement) noexcept;
     bool narrow(double max_displacement) noexcept;
 
-    std::vector<double> radii_;  // least distances of what touches from the axes of the tools [m]
+    std::vector<double> radii_, least_;  // of the tools; least distances from their axes of what may touch [m]
     std::vector<Near> near_;
     std::vector<ToolPoint> contacts_;
     std::vector<Mark> marks_;
@@ -148,14 +148,12 @@ inline void ContactBounds::assign(const EquilibriumProblem& problem, const Trian
 
 inline void ContactBounds::find_near(std::size_t i, const Triangles& triangles, const Points<double>& y,
                                      const Tool<double>& tool, const ContactVertices* vertices) {
-    const double radius = tool.radius + (vertices == nullptr ? 0 : vertices->largest_lift(tool.radius));
+    const double max_distance = 1.25 * (tool.radius + (vertices == nullptr ? 0 : vertices->largest_lift(tool.radius)));
     for (const auto& of_triangle : triangles.colwise()) {
         const std::array<Index, 3> corners{of_triangle[0], of_triangle[1], of_triangle[2]};
-        if (detail::is_far(triangle_at(y, corners), tool, 1.25 * radius)) continue;
-        for (const Index v : vertices == nullptr ? std::span<const Index>() : std::span<const Index>(corners)) {
+        if (detail::is_far(triangle_at(y, corners), tool, max_distance)) continue;
+        for (const Index v : vertices == nullptr ? std::span<const Index>() : std::span<const Index>(corners))
             if (vertices->carries(v, tool.radius)) add_near(i, {v, v, v}, vertices->lift(v, tool.radius), y, tool);
-        }
-        if (vertices != nullptr && vertices->carry_alone(corners, tool.radius)) continue;
         add_near(i, corners, vertices == nullptr ? 0 : vertices->face_lift(corners, tool.radius), y, tool);
     }
 }
@@ -180,7 +178,6 @@ inline void ContactBounds::add_near(std::size_t i, const std::array<Index, 3>& c
     const double min_distance = tool.radius + lift;
     rounding_ = (std::max)(rounding_, static_cast<double>(rounding * size));
     penetration_ = (std::max)(penetration_, static_cast<double>(min_distance - distance + rounding * size));
-    radii_[i] = (std::min)(radii_[i], min_distance);
     near_.push_back({i, corners, min_distance, u, static_cast<double>(distance)});
 }
 
@@ -221,7 +218,7 @@ inline bool ContactBounds::bound_softening(const EquilibriumProblem& problem, co
         const double max_force =
             norm(point(force, v)) + problem.rounding() * magnitude[at(v)] + stiffness_[at(v)] * max_displacement;
         const double borne = (std::max)(borne_[at(v)], max_force / mark.cosine);
-        const double min_distance = radii_[mark.tool] - 2 * max_displacement - penetration_;
+        const double min_distance = least_[mark.tool] - 2 * max_displacement - penetration_;
         if (!(min_distance > radii_[mark.tool] / 4)) return false;
         mark.softening = (1 + 1e-9) * borne / min_distance;
         max_normal_force_ += (1 + 1e-9) * borne;
@@ -236,8 +233,10 @@ inline bool ContactBounds::bound_softening(const EquilibriumProblem& problem, co
 // Assigns to each vertex the tool that may touch it; false if there are two, or the vertex is fixed.
 inline bool ContactBounds::mark(const EquilibriumProblem& problem, double max_displacement) noexcept {
     std::fill(marks_.begin(), marks_.end(), Mark{});
+    least_ = radii_;
     for (const auto& candidate : near_) {
         if (candidate.distance - candidate.min_distance > max_displacement) continue;
+        least_[candidate.tool] = (std::min)(least_[candidate.tool], candidate.min_distance);
         for (const Index v : candidate.corners) {
             auto& mark = marks_[at(v)];
             if (problem.fixed(v) || (mark.tool != none && mark.tool != candidate.tool)) return false;

@@ -41,9 +41,9 @@ struct ContactPatch {
     Index splits = no_index;  ///< of a tear, that tracker and tree have followed; a step refuses a contact with fewer
 
     ///@{
-    /// Valid until the tracker's next update: a contact point for each pair of triangle and tool feature within
-    /// `detection_distance`; the triangles within it, by the active one, or on a path through; these and their
-    /// neighbours; and those of `triangles` whose faces carry the contact.
+    /// Valid until the tracker's next update: a contact point for each vertex that carries the contact, and for each
+    /// pair of a face that does and a tool feature within `detection_distance`; the triangles within it, by the active
+    /// one, or on a path through; these and their neighbours; and those of `triangles` whose faces carry the contact.
     std::span<const ContactPoint<Scalar>> points;
     std::span<const ContactTriangle> triangles, candidates, faces;
     ///@}

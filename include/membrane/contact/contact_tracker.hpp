@@ -41,7 +41,7 @@ struct TrackerOptions {
     Index full_query_interval = 128;   ///< ticks in contact between full tree queries, which find further folds
     Index max_contact_points = 16384;  ///< capacity for contact points; determines memory, not time
     /// The largest circumradius of triangles whose vertices carry the contact, see `ContactVertices`; the others carry
-    /// it with their faces. 0: all do [tool radii].
+    /// it with their faces. 0: all do. More than 0.5 is for shallow contacts: deep ones stretch triangles [tool radii].
     double fine_triangles = 0;
 };
 
@@ -55,8 +55,10 @@ struct TrackerOptions {
 /// displacement. A second fold of the surface that approaches a tool in contact is found within `full_query_interval`
 /// ticks; beyond a tear, at once.
 ///
-/// A contact begins if the gap is not positive. It ends if the gap is positive and either the tool has left the rest
-/// surface or the gap exceeds depth plus travel of the tool: a membrane that springs back stays in contact.
+/// A contact begins if the gap is not positive; where vertices carry it, if one is no farther from the tool than its
+/// lift. It ends if the gap beyond the lift is positive and either the tool has left the rest surface or the gap
+/// exceeds depth plus travel of the tool: a membrane that springs back stays in contact. After tunnelling, faces carry
+/// it.
 ///
 /// The tool stays outside a closed surface: where the winding number is 0. At an open surface the tool stays on the
 /// side of first contact. If that contact is on a border, the side is fixed when the contact has left the border, or
@@ -424,12 +426,10 @@ bool ContactTracker<Scalar>::contacts(const Scene& scene, Contact<Scalar>& conta
 // Whether the active triangle or a corner that carries the contact is as near to the tool as it may be.
 template <Real Scalar>
 bool ContactTracker<Scalar>::touches(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
-    const auto face_lift = static_cast<Scalar>(vertices_.face_lift(contact.corners, scene.radius));
-    if (contact.patch.tunnelled || contact.gap <= face_lift) return true;
+    if (contact.patch.tunnelled || contact.gap <= vertices_.face_lift(contact.corners, scene.radius)) return true;
     return std::any_of(contact.corners.begin(), contact.corners.end(), [&](Index v) {
         const auto from_axis = to_segment(membrane::point(scene.x, v), scene.tool.position, scene.tool.axis);
-        const auto lifted = scene.radius + static_cast<Scalar>(vertices_.lift(v, scene.radius));
-        return vertices_.carries(v, scene.radius) && norm(from_axis) <= lifted;
+        return vertices_.carries(v, scene.radius) && norm(from_axis) <= scene.radius + vertices_.lift(v, scene.radius);
     });
 }
 
@@ -661,8 +661,11 @@ void ContactTracker<Scalar>::find_points(const Scene& scene, Contact<Scalar>& co
         contact.patch.fine_triangles = vertices_.fine();
         find_vertices(scene, contact);
         faces_.clear();
+        const bool deep = contact.gap < -scene.radius / 4;  // no triangle is nearer than the active one
         for (const auto& [f, corners, none] : contact.patch.triangles) {
-            if (vertices_.carry_alone(corners, scene.radius)) continue;
+            Scalar square = scene.radius * scene.radius;
+            if (deep) square = closest_to_axis(triangle_at(scene.x, corners), scene.tool).on_triangle.squared_distance;
+            if (!vertices_.may_touch(corners, scene.radius, std::sqrt(square))) continue;
             faces_.try_push_back({f, corners, vertices_.face_lift(corners, scene.radius)});
         }
         contact.patch.faces = faces_.items();

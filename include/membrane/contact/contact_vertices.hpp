@@ -19,15 +19,17 @@
 namespace membrane {
 
 /// On a fine mesh the vertices stay outside the tool, and the faces between them cut into it. A smooth surface through
-/// the vertices of a face cuts in less than the face: it touches a tool of radius R, for faces of circumradius c, where
-/// the vertices stay sqrt(R^2 + w c^2) from the axis. If the vertices touched the tool, w = 0, a membrane on a
-/// foundation would push too little; with w = 1 the faces would touch it, and hold the membrane too far out.
+/// the vertices of a face cuts in less than the face: it touches a tool of radius R, for faces of circumradius c (half
+/// of the longest edge if an angle is obtuse), where the vertices stay sqrt(R^2 + w c^2) from the axis. If the vertices
+/// touched the tool, w = 0, a membrane on a foundation would push too little; with w = 1 the faces would touch it, and
+/// hold the membrane too far out.
 ///
 /// Larger triangles carry the contact with their faces. Up to twice the size of `fine` triangles both do: the larger
 /// they are, the less is a vertex lifted, and the less may a face cut in. So on a graded mesh the force does not jump
 /// where faces take over.
 ///
-/// Lengths are those of the mesh at rest, in double: what is fine does not change as the membrane stretches.
+/// Lengths are those of the mesh at rest: what is fine does not change as the membrane stretches. However far it does,
+/// no face comes nearer to the axis than half the radius: the tool does not pass between the vertices.
 class ContactVertices {
   public:
     /// Of `surface` at rest at `x` (3 x V [m]). Triangles are fine if their circumradius is at most `fine` tool radii;
@@ -54,18 +56,20 @@ class ContactVertices {
     [[nodiscard]] bool any() const noexcept { return fine_ > 0; }
     ///@}
 
-    /// 1 for a vertex between triangles that are fine for a tool of this radius [m], 0 where one is twice as large as
-    /// that, or larger.
+    /// 1 for a vertex between triangles that are fine for a tool of this radius [m], 0 beside one twice as large.
     [[nodiscard]] double roundness(Index v, double radius) const noexcept {
         return any() ? std::clamp(2 - std::sqrt(squares_[at(v)].largest) / (fine_ * radius), 0.0, 1.0) : 0;
     }
 
     ///@{
-    /// Whether `v` carries the contact with a tool of this radius [m]; whether these corners do so alone, without their
-    /// face.
+    /// Whether `v` carries the contact with a tool of this radius [m]; whether these corners do so without their face;
+    /// whether this may touch, at `distance` from the axis: it helps to carry, or is deep in the tool.
     [[nodiscard]] bool carries(Index v, double radius) const noexcept { return roundness(v, radius) > 0; }
     [[nodiscard]] bool carry_alone(const std::array<Index, 3>& corners, double radius) const noexcept {
         return std::all_of(corners.begin(), corners.end(), [&](Index v) { return roundness(v, radius) == 1; });
+    }
+    [[nodiscard]] bool may_touch(const std::array<Index, 3>& corners, double radius, double distance) const noexcept {
+        return distance < 3 * radius / 4 || !carry_alone(corners, radius);
     }
     ///@}
 
@@ -83,15 +87,12 @@ class ContactVertices {
     }
     ///@}
 
-    /// How far outside a tool of this radius the face of these corners stays: not above 0, and as deep as a face
-    /// between points of the tool cuts into it where the triangles are fine [m].
+    /// How far outside a tool of this radius the face of these corners stays, not above 0: minus half the radius where
+    /// they carry alone, elsewhere at most as deep as the face of a fine triangle cuts into a sphere [m].
     [[nodiscard]] double face_lift(const std::array<Index, 3>& corners, double radius) const noexcept {
-        double round = any() ? 1 : 0, square = fine_ * fine_ * radius * radius;
-        for (std::size_t k = 0; any() && k < 3; ++k) {
-            round = (std::min)(round, roundness(corners[k], radius));
-            square = (std::min)(square, squares_[at(corners[k])].largest);
-        }
-        return -round * square / (2 * radius);
+        const auto of = [&](std::size_t k) { return roundness(corners[k], radius); };
+        const double round = (std::min)({of(0), of(1), of(2)});
+        return -radius / 2 * (round == 1 ? 1 : round * fine_ * fine_);
     }
 
   private:

@@ -442,10 +442,8 @@ bool ToolContact<Scalar>::has_new_overlap(const Context& context) const noexcept
                 continue;
             }
             const auto nearest = closest_points(surface_triangle(context, listed.corners), tool, feature);
-            const Scalar slack = negligible_distance(context, listed.corners[0]);
-            if (!nearest) continue;
-            if (norm(nearest->separation) < contact.patch.radius + static_cast<Scalar>(listed.lift) - slack)
-                return true;
+            const Scalar lift = static_cast<Scalar>(listed.lift) - negligible_distance(context, listed.corners[0]);
+            if (nearest && norm(nearest->separation) < contact.patch.radius + lift) return true;
         }
     }
     return false;
