@@ -166,7 +166,7 @@ struct Run {
     AabbTree<double> tree{scene.mesh};
     // A second fold that comes to the tool is known at once.
     ContactTracker<double> tracker{scene.mesh, {.full_query_interval = 1, .fine_triangles = 0}},
-        tracker_2{scene.mesh, {.full_query_interval = 1}};
+        tracker_2{scene.mesh, {.full_query_interval = 1, .fine_triangles = 0}};
     Grasper<double> grasper{scene.mesh};
     Points<double> x = scene.mesh.positions();
     std::vector<char> has_taken_part = std::vector<char>(static_cast<std::size_t>(scene.mesh.vertex_count()), 0);

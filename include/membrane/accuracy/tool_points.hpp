@@ -99,30 +99,28 @@ inline bool is_before(const ToolPoint& a, const ToolPoint& b) { return detail::n
 inline std::vector<ToolPoint> tool_points(const Triangles& triangles, const Points<double>& x,
                                           std::span<const Tool<double>> tools, double max_distance,
                                           std::span<const ContactVertices> carriers) {
+    const ContactVertices none;
     std::vector<ToolPoint> points;
     for (std::size_t i = 0; i < tools.size(); ++i) {
         const auto& tool = tools[i];
-        const ContactVertices* const vertices = i < carriers.size() && carriers[i].any() ? &carriers[i] : nullptr;
-        const double lift = vertices == nullptr ? 0 : vertices->largest_lift(tool.radius);
-        const double within = tool.radius + lift + max_distance;
+        const ContactVertices& vertices = i < carriers.size() ? carriers[i] : none;
+        const double within = tool.radius + vertices.largest_lift(tool.radius) + max_distance;
         for (Index f = 0; f < static_cast<Index>(triangles.cols()); ++f) {
             const std::array<Index, 3> corners{triangles(0, f), triangles(1, f), triangles(2, f)};
             const auto triangle = triangle_at(x, corners);
             if (detail::is_far(triangle, tool, within)) continue;
-            for (const Index v : vertices == nullptr ? std::span<const Index>() : std::span<const Index>(corners)) {
-                if (!vertices->carries(v, tool.radius)) continue;
+            for (const Index v : corners) {
+                if (!vertices.carries(v, tool.radius)) continue;
                 ToolPoint point{vertex_point<double>(v, membrane::point(x, v), f, corners, tool, tool.radius,
-                                                     vertices->lift(v, tool.radius)),
+                                                     vertices.lift(v, tool.radius)),
                                 i};
                 point.gap -= point.lift;
                 if (!point.normal.isZero(0) && point.gap <= max_distance) points.push_back(point);
             }
-            if (vertices != nullptr && !vertices->may_touch(corners, tool.radius, distance_from_axis(triangle, tool)))
-                continue;
             for (int feature = 0; feature < feature_pairs(tool); ++feature) {
                 auto point = contact_point(f, corners, triangle, tool, feature, tool.radius);
                 if (!point || point->normal.isZero(0)) continue;
-                point->lift = vertices == nullptr ? 0 : vertices->face_lift(corners, tool.radius);
+                point->lift = vertices.face_lift(corners, tool.radius);
                 point->gap -= point->lift;
                 if (point->gap <= max_distance) points.push_back({*point, i});
             }

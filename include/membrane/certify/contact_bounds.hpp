@@ -93,7 +93,7 @@ class ContactBounds {
     };
     [[nodiscard]] static std::size_t at(Index v) noexcept { return static_cast<std::size_t>(v); }
     void find_near(std::size_t i, const Triangles& triangles, const Points<double>& y, const Tool<double>& tool,
-                   const ContactVertices* vertices);
+                   const ContactVertices& vertices);
     void add_near(std::size_t i, const std::array<Index, 3>& corners, double lift, const Points<double>& y,
                   const Tool<double>& tool);
     [[nodiscard]] Vector3<double> take_contact(const ToolPoint& contact, const Points<double>& y,
@@ -129,7 +129,7 @@ inline void ContactBounds::assign(const EquilibriumProblem& problem, const Trian
     clear();
     for (std::size_t i = 0; i < tools.size(); ++i) {
         radii_.push_back(tools[i].tool.radius);
-        find_near(i, triangles, y, tools[i].tool, carriers.empty() ? nullptr : &carriers[i]);
+        find_near(i, triangles, y, tools[i].tool, i < carriers.size() ? carriers[i] : ContactVertices());
     }
     std::fill(borne_.begin(), borne_.end(), 0.0);
     for (const auto& contact : contacts) {
@@ -147,14 +147,15 @@ inline void ContactBounds::assign(const EquilibriumProblem& problem, const Trian
 }
 
 inline void ContactBounds::find_near(std::size_t i, const Triangles& triangles, const Points<double>& y,
-                                     const Tool<double>& tool, const ContactVertices* vertices) {
-    const double max_distance = 1.25 * (tool.radius + (vertices == nullptr ? 0 : vertices->largest_lift(tool.radius)));
+                                     const Tool<double>& tool, const ContactVertices& vertices) {
+    const double max_distance = 1.25 * (tool.radius + vertices.largest_lift(tool.radius));
     for (const auto& of_triangle : triangles.colwise()) {
         const std::array<Index, 3> corners{of_triangle[0], of_triangle[1], of_triangle[2]};
         if (detail::is_far(triangle_at(y, corners), tool, max_distance)) continue;
-        for (const Index v : vertices == nullptr ? std::span<const Index>() : std::span<const Index>(corners))
-            if (vertices->carries(v, tool.radius)) add_near(i, {v, v, v}, vertices->lift(v, tool.radius), y, tool);
-        add_near(i, corners, vertices == nullptr ? 0 : vertices->face_lift(corners, tool.radius), y, tool);
+        for (const Index v : corners) {
+            if (vertices.carries(v, tool.radius)) add_near(i, {v, v, v}, vertices.lift(v, tool.radius), y, tool);
+        }
+        add_near(i, corners, vertices.face_lift(corners, tool.radius), y, tool);
     }
 }
 

@@ -661,11 +661,13 @@ void ContactTracker<Scalar>::find_points(const Scene& scene, Contact<Scalar>& co
         contact.patch.fine_triangles = vertices_.fine();
         find_vertices(scene, contact);
         faces_.clear();
-        const bool deep = contact.gap < -scene.radius / 4;  // no triangle is nearer than the active one
+        const auto is_deep = [&, deep = 3 * scene.radius / 4](const std::array<Index, 3>& corners) {
+            if (scene.radius + contact.gap >= deep) return false;  // the active triangle is nearest
+            const auto nearest = closest_to_axis(triangle_at(scene.x, corners), scene.tool).on_triangle;
+            return nearest.squared_distance < deep * deep;
+        };
         for (const auto& [f, corners, none] : contact.patch.triangles) {
-            Scalar square = scene.radius * scene.radius;
-            if (deep) square = closest_to_axis(triangle_at(scene.x, corners), scene.tool).on_triangle.squared_distance;
-            if (!vertices_.may_touch(corners, scene.radius, std::sqrt(square))) continue;
+            if (vertices_.carry_alone(corners, scene.radius) && !is_deep(corners)) continue;
             faces_.try_push_back({f, corners, vertices_.face_lift(corners, scene.radius)});
         }
         contact.patch.faces = faces_.items();

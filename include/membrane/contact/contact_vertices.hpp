@@ -32,6 +32,8 @@ namespace membrane {
 /// no face comes nearer to the axis than half the radius: the tool does not pass between the vertices.
 class ContactVertices {
   public:
+    ContactVertices() = default;  ///< none
+
     /// Of `surface` at rest at `x` (3 x V [m]). Triangles are fine if their circumradius is at most `fine` tool radii;
     /// 0: none are. Cost: O(V + F).
     template <Real Scalar>
@@ -62,14 +64,10 @@ class ContactVertices {
     }
 
     ///@{
-    /// Whether `v` carries the contact with a tool of this radius [m]; whether these corners do so without their face;
-    /// whether this may touch, at `distance` from the axis: it helps to carry, or is deep in the tool.
+    /// Whether `v` carries the contact with a tool of this radius [m]; whether these corners do so without their face.
     [[nodiscard]] bool carries(Index v, double radius) const noexcept { return roundness(v, radius) > 0; }
     [[nodiscard]] bool carry_alone(const std::array<Index, 3>& corners, double radius) const noexcept {
         return std::all_of(corners.begin(), corners.end(), [&](Index v) { return roundness(v, radius) == 1; });
-    }
-    [[nodiscard]] bool may_touch(const std::array<Index, 3>& corners, double radius, double distance) const noexcept {
-        return distance < 3 * radius / 4 || !carry_alone(corners, radius);
     }
     ///@}
 
@@ -107,7 +105,7 @@ class ContactVertices {
         return std::sqrt(radius * radius + part * square) - radius;
     }
 
-    double fine_;
+    double fine_ = 0;
     std::vector<Squares> squares_;
 };
 
