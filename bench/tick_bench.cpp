@@ -180,7 +180,7 @@ void sizes_of_scenes(benchmark::internal::Benchmark* measured) {
     measured->Iterations(1)->UseManualTime();
 }
 BENCHMARK(scene<SphereScene>)->Name("scene/sphere")->Apply(sizes_of_scenes);
-BENCHMARK(scene<ByVertices>)->Name("scene/by_vertices")->Apply(sizes_of_scenes);
+BENCHMARK(scene<ByFaces>)->Name("scene/by_faces")->Apply(sizes_of_scenes);
 BENCHMARK(scene<TwoTools>)->Name("scene/two_tools")->Apply(sizes_of_scenes);
 BENCHMARK(scene<CapsuleTool>)->Name("scene/capsule")->Apply(sizes_of_scenes);
 BENCHMARK(scene<PointTool>)->Name("scene/point")->Apply(sizes_of_scenes);

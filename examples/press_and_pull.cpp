@@ -49,7 +49,9 @@ Record run(const Scene& scene, const Volume& foundation, const Motion& motion, c
         device.write(feel({tool, contact, report, grasp}));
         watch.lap();
         const Vector3d displacement = tool.position + grasp.offset - grasp.origin;  // of the held point
-        record.add({.tool = tool,
+        auto drawn = tool;
+        drawn.radius = drawn_radius(tool, contact, x);
+        record.add({.tool = drawn,
                     .depth = contact.depth,
                     .pulled = grasp.holding() ? displacement.norm() : 0,
                     .felt = device.force(),

@@ -68,6 +68,7 @@ Figure press(const Scene& scene) {
         tree.refit(x, report.moved);
         force = report.total_reaction();
         device.write(force);
+        tool.radius = drawn_radius(tool, contact, x);  // for the picture
     }
     std::cout << scene.name << ", " << mesh.vertex_count() << " vertices: " << 1e3 * force.norm() << " mN" << std::endl;
     return tension_figure(scene.name, sheet, {.mesh = mesh, .points = x, .tool = tool, .force = force});

@@ -54,7 +54,7 @@ struct Sheet {
     double loaded_radius = 1;     ///< the pressure is on triangles within this distance of the z axis [m]
     double foundation = 0;        ///< along the normal [Pa/m]
     std::vector<Index> pinned{};  ///< vertices that keep their positions
-    double fine_triangles = 0;    ///< where vertices carry the contact, see `TrackerOptions`
+    double fine_triangles = membrane::TrackerOptions().fine_triangles;
 
     /// The equilibrium with pinned vertices where `x` has them. @throws std::runtime_error if none is found
     [[nodiscard]] membrane::Equilibrium equilibrium(const Points& x, const std::vector<Tool>& tools = {}) const;
@@ -165,7 +165,7 @@ inline membrane::Equilibrium Sheet::corrected_equilibrium(const Points& x, const
         const auto found = equilibrium(x, pressed);
         bool done = true;
         for (std::size_t i = 0; i < balls.size(); ++i) {
-            membrane::ContactTracker<double> tracker(mesh);
+            membrane::ContactTracker<double> tracker(mesh, {.fine_triangles = 0});
             const auto contact = contact_of(mesh, x, pressed[i], tracker);
             const Vector3 offset = pressed[i].position - balls[i].position;
             const Vector3 change = correction(found.x, contact, found.reactions[i]) - offset;

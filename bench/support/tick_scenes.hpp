@@ -77,10 +77,10 @@ struct SphereScene : Membrane<> {
     explicit SphereScene(const Mesh& on) : Membrane(on, linear_network(on)) {}
 };
 
-/// The vertices carry the contact.
-struct ByVertices : SphereScene {
-    explicit ByVertices(const Mesh& on) : SphereScene(on) {
-        tracker = membrane::ContactTracker<double>(mesh, {.fine_triangles = 0.5});
+/// Faces alone carry the contact.
+struct ByFaces : SphereScene {
+    explicit ByFaces(const Mesh& on) : SphereScene(on) {
+        tracker = membrane::ContactTracker<double>(mesh, {.fine_triangles = 0});
     }
 };
 

@@ -44,7 +44,7 @@ inline Table tick_scenes_table(const std::string& topic, const std::string& titl
     const auto add = [&](const std::string& name, const std::string& scene) {
         table.rows.push_back({name, "scene/" + scene, Row::gain, "scene/sphere"});
     };
-    add("contact by vertices", "by_vertices");
+    add("contact by faces", "by_faces");
     add("two spheres", "two_tools");
     add("a capsule", "capsule");
     add("a point", "point");

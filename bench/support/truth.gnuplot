@@ -46,16 +46,18 @@ plot 1 dt 2 lc '#999999' notitle, -1 dt 2 lc '#999999' notitle, \
      'truth_cap.tsv' using 1:(difference(3)) title 'cornea' lc rgb colour(1) pt 7, \
      'truth_capsule.tsv' using 1:(difference(3)) title 'capsule' lc rgb colour(2) pt 7
 
+set key bottom right
 do for [ball in 'a b c'] {
     set title '6' . ball . '. ball of ' . (ball eq 'a' ? '0.5' : ball eq 'b' ? '1' : '2') . ' mm'
     set xlabel 'depth [radii]'
-    set yrange [-5:8]
+    set yrange [-10:5]
     plot 1 dt 2 lc '#999999' notitle, -1 dt 2 lc '#999999' notitle, \
          for [i = 3:5] 'truth_ball_' . ball . '.tsv' using 1:(difference(i)) \
              title word('vertex edge face', i - 2) lc rgb colour(i - 2) pt 7, \
          '' using 1:(difference(12)) title 'graded DistMesh' lc rgb colour(4) pt 7
 }
 
+set key top right
 set title '8. shells that bend'
 set xlabel 'Pa'
 set yrange [-10:20]
@@ -70,26 +72,27 @@ set xlabel 'depth [radii]'
 set yrange [-10:10]
 plot 1 dt 2 lc '#999999' notitle, -1 dt 2 lc '#999999' notitle, \
      'truth_tools.tsv' using 1:(difference(3)) title 'each of two' lc rgb colour(1) pt 7, \
-     '' using 1:(difference(5)) title 'smaller radius' lc rgb colour(4) pt 7, \
+     '' using 1:(difference(4)) title 'by faces' lc rgb colour(4) pt 7, \
      '' using 1:(difference(6)) title 'graded DistMesh' lc rgb colour(2) pt 7
 unset multiplot
 
-# What a ball's contact with flat triangles does to its force, against the depth in edges.
+# What triangles as large as the contact do to the force of a ball, against the depth in edges.
 set terminal svg size 900,330 font 'Helvetica,Arial,sans-serif,12' background '#ffffff'
 set output 'facets.svg'
 set multiplot layout 1,3 title 'Force of a ball: difference [%] by depth over edge' font ',15'
 edge = 5.0 / 28  # [mm]
 names = 'vertex edge face'
+over(i) = 'over ' . word('a an a', i + 1) . ' ' . word(names, i + 1)
 radius(ball) = ball eq 'a' ? 0.5 : ball eq 'b' ? 1 : 2
 set xlabel 'depth / edge'
 set xrange [0.05:10]
 set yrange [-30:45]
 set key top right
-plot_of(first, step) = sprintf("plot 0 lc '#999999' notitle, for [b in 'a b c'] for [i = 0:2] 'truth_ball_'.b.'.tsv' using ($1 * radius(b) / edge):(difference(%d + %d * i)) title (b eq 'a' ? 'over a '.word(names, i + 1) : '') lc rgb colour(i + 1) pt 7", first, step)
-set title 'the ball as it is'
-eval plot_of(6, 2)
-set title 'tool\_radius()'
-eval plot_of(7, 2)
-set title 'FacetCorrection'
+plot_of(first, step) = sprintf("plot 0 lc '#999999' notitle, for [b in 'a b c'] for [i = 0:2] 'truth_ball_'.b.'.tsv' using ($1 * radius(b) / edge):(difference(%d + %d * i)) title (b eq 'a' ? over(i) : '') lc rgb colour(i + 1) pt 7", first, step)
+set title 'vertices carry the contact'
 eval plot_of(3, 1)
+set title 'faces carry it'
+eval plot_of(6, 2)
+set title 'faces, FacetCorrection'
+eval plot_of(7, 2)
 unset multiplot

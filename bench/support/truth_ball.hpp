@@ -54,12 +54,11 @@ inline constexpr double start_gap = 0.01;  // between ball and sheet before the 
     return half;
 }
 
-/// What stands for the ball on flat triangles.
-enum class Ball {
-    as_it_is,
-    by_vertices,  ///< which carry the contact wherever they may
-    smaller,      ///< by `tool_radius()` of the mean edge
-    corrected,    ///< moved back by `FacetCorrection`
+/// What carries the contact of the ball.
+enum class Carried {
+    by_default,  ///< vertices, where triangles are fine
+    by_faces,    ///< faces alone
+    corrected,   ///< faces, the ball moved back by `FacetCorrection`
 };
 
 /// A ball at (x, 0), to be compared with another program; if x is not 0, a second one at (-x, 0) does the same.
@@ -70,11 +69,8 @@ struct BallScene {
     /// The force on the ball at each depth [mN], in the limit of a membrane unless `part` of the thickness is 1.
     [[nodiscard]] Column calculix(const Effort& effort, const std::string& name, double part) const;
 
-    /// The same by the library, on a disc whose edges are this long under the ball [m].
-    [[nodiscard]] std::vector<double> forces(const Mesh& mesh, Ball kind, double edge) const;
-    [[nodiscard]] std::vector<double> forces(const Mesh& mesh, Ball kind) const {
-        return forces(mesh, kind, membrane::mean_edge(mesh));
-    }
+    /// The same by the library.
+    [[nodiscard]] std::vector<double> forces(const Mesh& mesh, Carried kind = Carried::by_default) const;
 };
 
 inline Column BallScene::calculix(const Effort& effort, const std::string& name, double part) const {
@@ -97,19 +93,18 @@ inline Column BallScene::calculix(const Effort& effort, const std::string& name,
     });
 }
 
-inline std::vector<double> BallScene::forces(const Mesh& mesh, Ball kind, double edge) const {
+inline std::vector<double> BallScene::forces(const Mesh& mesh, Carried kind) const {
     Sheet sheet = flat_sheet(mesh);
-    if (kind == Ball::by_vertices) sheet.fine_triangles = 1;
+    if (kind != Carried::by_default) sheet.fine_triangles = 0;
     Points position = mesh.positions();
     std::vector<double> found;
     for (const double depth : depths) {
-        Tool ball{.position = {x, 0, (1 - depth) * radius},
-                  .radius = kind == Ball::smaller ? membrane::tool_radius(radius, edge) : radius};
+        Tool ball{.position = {x, 0, (1 - depth) * radius}, .radius = radius};
         std::vector<Tool> tools{ball};
         ball.position.x() = -x;
         if (x != 0) tools.push_back(ball);
-        const auto equilibrium =
-            kind == Ball::corrected ? sheet.corrected_equilibrium(position, tools) : sheet.equilibrium(position, tools);
+        const auto equilibrium = kind == Carried::corrected ? sheet.corrected_equilibrium(position, tools)
+                                                            : sheet.equilibrium(position, tools);
         position = equilibrium.x;
         found.push_back(1e3 * equilibrium.reactions[0].z());
     }
@@ -155,22 +150,20 @@ struct Placement {
     table.reference = scene.calculix(effort, "CalculiX", 0.1);
     const auto fine = placements(effort.rings), coarse = placements(effort.rings / 2);
     for (std::size_t i = 0; i < fine.size(); ++i) {
-        table.ours.push_back(single(fine[i].name, [&] { return scene.forces(fine[i].mesh, Ball::corrected); }));
-        table.ours.back().coarse = scene.forces(coarse[i].mesh, Ball::corrected);
+        table.ours.push_back(single(fine[i].name, [&] { return scene.forces(fine[i].mesh); }));
+        table.ours.back().coarse = scene.forces(coarse[i].mesh);
     }
-    for (const auto& place : fine) {
+    for (const auto& [name, mesh] : fine) {
+        table.ours.push_back(single(name + ", by faces", [&] { return scene.forces(mesh, Carried::by_faces); }));
         table.ours.push_back(
-            single(place.name + ", by vertices", [&] { return scene.forces(place.mesh, Ball::by_vertices); }));
-        table.ours.push_back(
-            single(place.name + ", radius as it is", [&] { return scene.forces(place.mesh, Ball::as_it_is); }));
-        table.ours.push_back(
-            single(place.name + ", smaller radius", [&] { return scene.forces(place.mesh, Ball::smaller); }));
+            single(name + ", by faces, corrected", [&] { return scene.forces(mesh, Carried::corrected); }));
     }
     const Mesh graded = disc_for_loads(effort.rings, {{.radius = radius / 2}});
     const std::string name = "graded by DistMesh, " + vertices_of(graded);
-    table.ours.push_back(single(name + ", corrected", [&] { return scene.forces(graded, Ball::corrected); }));
-    table.explained = table.ours.back().name;
-    table.ours.push_back(single(name + ", radius as it is", [&] { return scene.forces(graded, Ball::as_it_is); }));
+    table.ours.push_back(single(name, [&] { return scene.forces(graded); }));
+    table.explained = name;
+    table.ours.push_back(
+        single(name + ", by faces, corrected", [&] { return scene.forces(graded, Carried::corrected); }));
     return table;
 }
 
@@ -194,17 +187,17 @@ struct Placement {
                      .loads = effort.some({0.1, 0.2, 0.5})};
     const BallScene scene{.radius = 1e-3, .x = 1.5e-3, .depths = table.loads};
     table.reference = scene.calculix(effort, "CalculiX", 0.1);
-    table.ours.push_back(compared(effort.rings_name(), effort.rings,
-                                  [&](int rings) { return scene.forces(disc_with_patch(rings), Ball::corrected); }));
+    table.ours.push_back(
+        compared(effort.rings_name(), effort.rings, [&](int rings) { return scene.forces(disc_with_patch(rings)); }));
     const Mesh mesh = disc_with_patch(effort.rings);
-    table.ours.push_back(single("by vertices", [&] { return scene.forces(mesh, Ball::by_vertices); }));
-    table.ours.push_back(single("radius as it is", [&] { return scene.forces(mesh, Ball::as_it_is); }));
-    table.ours.push_back(single("smaller radius", [&] { return scene.forces(mesh, Ball::smaller); }));
+    table.ours.push_back(single("by faces", [&] { return scene.forces(mesh, Carried::by_faces); }));
+    table.ours.push_back(single("by faces, corrected", [&] { return scene.forces(mesh, Carried::corrected); }));
     const Mesh graded = disc_for_loads(effort.rings, {{.centre = {scene.x, 0, 0}, .radius = scene.radius / 2},
                                                       {.centre = {-scene.x, 0, 0}, .radius = scene.radius / 2}});
-    table.ours.push_back(single("graded by DistMesh, " + vertices_of(graded) + ", corrected",
-                                [&] { return scene.forces(graded, Ball::corrected); }));
-    table.explained = table.ours.back().name;
+    table.explained = "graded by DistMesh, " + vertices_of(graded);
+    table.ours.push_back(single(table.explained, [&] { return scene.forces(graded); }));
+    table.ours.push_back(
+        single(table.explained + ", by faces, corrected", [&] { return scene.forces(graded, Carried::corrected); }));
     return table;
 }
 

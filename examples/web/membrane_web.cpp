@@ -152,6 +152,9 @@ class Loop {
     [[nodiscard]] Moment moment() const { return session_.moment(); }
     [[nodiscard]] Vector3 force() const { return session_.force(); }
     [[nodiscard]] double radius() const { return hand_.tool().radius; }
+    [[nodiscard]] double drawn_radius() const {
+        return membrane::drawn_radius(session_.moment().tool, session_.moment().contact, session_.x());
+    }
     [[nodiscard]] double size() const { return size_of(session_.mesh()); }
 
     /// The reaction in the equilibrium of `moment` near `positions` [N]; null if none was found.
@@ -304,7 +307,8 @@ EMSCRIPTEN_BINDINGS(membrane) {
     value_object<Patch>("ContactPatch")
         .field("axisPoint", &Patch::axis_point)
         .field("detectionDistance", &Patch::detection_distance)
-        .field("radius", &Patch::radius);
+        .field("radius", &Patch::radius)
+        .field("fineTriangles", &Patch::fine_triangles);
     using Contact = membrane::Contact<double>;
     value_object<Contact>("Contact")  // what an equilibrium needs of it
         .field("touching", &touching, &set_touching)
@@ -364,6 +368,7 @@ EMSCRIPTEN_BINDINGS(membrane) {
         .function("moment", &Loop::moment)
         .function("force", &Loop::force)
         .function("radius", &Loop::radius)
+        .function("drawnRadius", &Loop::drawn_radius)
         .function("size", &Loop::size)
         .function("equilibrium", &Loop::equilibrium)
         .function("choose", &Loop::choose);

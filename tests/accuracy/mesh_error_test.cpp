@@ -45,7 +45,7 @@ struct Sheet {
     double foundation = 0;              // along the normal [Pa/m]
     double patch_depth = 0;             // [m]: the force on the glued patch
     std::vector<Tool<double>> balls{};  // the force on the first
-    bool corrected = false;             // their radius, by `tool_radius`
+    double fine_triangles = 0;          // of `TrackerOptions`
 
     double operator()(const Mesh& mesh, Points<double>* at = nullptr) const {
         Points<double> x = mesh.positions();
@@ -77,13 +77,10 @@ struct Sheet {
   private:
     template <class Tissue, class Springs>
     Equilibrium solve(const Mesh& mesh, const Points<double>& x, const Tissue& tissue, const Springs& springs) const {
-        std::vector<ContactTracker<double>> trackers(balls.size(), ContactTracker<double>(mesh));
+        std::vector<ContactTracker<double>> trackers(balls.size(),
+                                                     ContactTracker(mesh, {.fine_triangles = fine_triangles}));
         const AabbTree<double> tree(mesh);
-        const auto pressed = [&](std::size_t i) {
-            Tool<double> ball = balls[i];
-            if (corrected) ball.radius = tool_radius(ball.radius, edge_under(mesh, ball.position));
-            return press(ball, trackers[i].update(tree, x, ball));
-        };
+        const auto pressed = [&](std::size_t i) { return press(balls[i], trackers[i].update(tree, x, balls[i])); };
         const auto run = [&](Index increments, const auto&... constraints) {
             return equilibrium(x, mesh, tissue, springs, {.increments = increments}, constraints...);
         };
@@ -103,19 +100,6 @@ struct Sheet {
             sum += area_vector(t).z() * (t.a + t.b + t.c).z() / 3;
         }
         return sum;
-    }
-
-    static double edge_under(const Mesh& mesh, const Point& place) {
-        double nearest = std::numeric_limits<double>::infinity(), edge = 0;
-        for (const auto& corners : mesh.triangles().colwise()) {
-            const auto t = triangle_at(mesh.positions(), corners);
-            const Point middle = (t.a + t.b + t.c) / 3;
-            const double distance = std::hypot(middle.x() - place.x(), middle.y() - place.y());
-            if (distance >= nearest) continue;
-            nearest = distance;
-            edge = (norm<double>(t.b - t.a) + norm<double>(t.c - t.b) + norm<double>(t.a - t.c)) / 3;
-        }
-        return edge;
     }
 };
 
@@ -270,7 +254,7 @@ Scene balls(Random& random, bool two) {
     const double radius = 1e-3 * std::pow(2, random.number(-1.0, 1.0)), depth = std::pow(10, random.number(-1.7, -0.3));
     const Point place =
         two ? Point(1.2 * radius + 2e-4, 0, 0) : Point(random.number(-3e-4, 3e-4), random.number(-3e-4, 3e-4), 0);
-    Sheet sheet{.corrected = random.chance(0.5)};
+    Sheet sheet{.fine_triangles = random.chance(0.5) ? 0.0 : 0.5};
     for (const double side : {1.0, -1.0}) {
         sheet.balls.push_back({.position = {side * place.x(), place.y(), (1 - depth) * radius}, .radius = radius});
         if (!two) break;

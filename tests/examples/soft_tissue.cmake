@@ -3,7 +3,7 @@ execute_process(COMMAND ${program} RESULT_VARIABLE code OUTPUT_VARIABLE output)
 if(NOT code EQUAL 0)
     message(FATAL_ERROR "expected exit code 0, got ${code}")
 endif()
-string(REGEX MATCH "pressed +([0-9.]+) mN, (1\\.[0-9]+) mm" found "${output}")
+string(REGEX MATCH "pressed +([0-9.]+) mN, (0\\.[89][0-9]+) mm" found "${output}")
 set(force "${CMAKE_MATCH_1}")
 set(displaced "${CMAKE_MATCH_2}")
 foreach(line "pressed +[1-9][0-9]+\\.[0-9] mN" "teleported +0\\.0 mN, 0\\.0" "paused +0\\.0 mN, ${displaced} mm"

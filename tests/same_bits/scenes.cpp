@@ -218,8 +218,8 @@ struct Variant {
     double radius = 0.002, depth = 0.0015;  // of the tool, of a press [m]
     double lift = 0;                        // by which forceps draw up what they hold [m]
     double friction = 0;                    // coefficient
-    double fine_triangles = 0;              // of the tracker [tool radii]
-    Vector axis = Vector::Zero();           // of the tool [m]
+    double fine_triangles = membrane::TrackerOptions().fine_triangles;
+    Vector axis = Vector::Zero();  // of the tool [m]
     bool flat = false, grasps = false, two_tools = false, loads = false;
 };
 
@@ -236,7 +236,7 @@ class Loop {
           solver_(network, variant.options, variant.rule, std::move(executor)),
           tree_(mesh),
           tracker_(mesh, {.fine_triangles = variant.fine_triangles}),
-          second_tracker_(mesh),
+          second_tracker_(mesh, {.fine_triangles = variant.fine_triangles}),
           grasper_(mesh),
           friction_({.coefficient = variant.friction}),
           strokes_(seed_of(name), 0.01, variant.depth, variant.flat),
@@ -585,7 +585,8 @@ class Scenes {
         loop("sphere_42", small, network(small), foundation(small), V{.depth = 0.003});
         loop("sphere_162", ball, network(ball), foundation(ball));
         loop("sphere_642", fine, network(fine), foundation(fine));
-        loop("by_vertices", fine, network(fine), foundation(fine), V{.friction = 0.2, .fine_triangles = 0.5});
+        loop("by_vertices", fine, network(fine), foundation(fine), V{.friction = 0.2});
+        loop("by_faces", fine, network(fine), foundation(fine), V{.friction = 0.2, .fine_triangles = 0});
         loop("ellipsoid", long_ball, network(long_ball), foundation(long_ball), V{.radius = 0.005});
         loop("sheet", flat, network(flat), foundation(flat), V{.flat = true});
         loop("point", ball, network(ball), foundation(ball), V{.radius = 0});

@@ -30,14 +30,15 @@ constexpr double spring = 40, foundation_stiffness = 8;  // [N/m]
 template <class S>
 class Scene {
   public:
-    Scene(Index squares, std::vector<Index> pinned, const SolverOptions<S>& options = {})
+    Scene(Index squares, std::vector<Index> pinned, const SolverOptions<S>& options = {},
+          const TrackerOptions& of_tracker = {})
         : mesh_(sheet<S>({.width = S(0.02), .height = S(0.02), .columns = squares, .rows = squares})),
           pulled_(border(mesh_).front()),
           network_(mesh_, LinearSpring{}, {.stiffness = S(spring), .pinned = with_border(std::move(pinned))}),
           foundation_(mesh_, {.stiffness = S(foundation_stiffness), .damping = S(0.02)}),
           solver_(network_, options),
           tree_(mesh_),
-          tracker_(mesh_),
+          tracker_(mesh_, of_tracker),
           x_(mesh_.positions()) {}
 
     const TriangleMesh<S>& mesh() const { return mesh_; }
@@ -254,12 +255,14 @@ TEST_CASE("nor does it jump over a pin, or a vertex that is held, in whatever or
 
 TEST_CASE("beside a rim a tool that stands still feels a force that does, however the solver predicts") {
     // At some places beside a rim there are two states of rest, and the path decides between them.
+    const double fine = GENERATE(0.0, 0.5);
+    const double felt = fine > 0 ? 0.01 : 0.02;  // flat faces hold the membrane farther off
     int places = 0, with_two_states = 0;
     for (double y = 0.0085; y < 0.0104; y += in_full() ? 5e-5 : 2e-4) {
         double forces[2];
         for (const bool predict : {false, true}) {
-            CAPTURE(y, predict);
-            Scene<double> scene(20, {}, {.sweeps = 4, .predict = predict});
+            CAPTURE(fine, y, predict);
+            Scene<double> scene(20, {}, {.sweeps = 4, .predict = predict}, {.fine_triangles = fine});
             double low = std::numeric_limits<double>::max(), high = 0;
             for (int i = 0; i <= 500; ++i) {
                 const double down = 0.6e-3 * std::min(i, 300) / 300;
@@ -267,7 +270,7 @@ TEST_CASE("beside a rim a tool that stands still feels a force that does, howeve
                 if (i > 400) low = std::min(low, force), high = std::max(high, force);
             }
             CHECK(high - low <= 1e-3 * high);
-            CHECK(high > 0.02);
+            CHECK(high > felt);
             forces[predict ? 1 : 0] = high;
         }
         ++places;

@@ -217,22 +217,6 @@ TEST_CASE("the spring of an edge without length has no stiffness", "[calibration
     CHECK(stiffnesses.back() == 0);  // vertices 2 and 3
 }
 
-TEST_CASE("a triangle with its corners on a ball touches the smaller one with its middle", "[calibration]") {
-    for (int seed = 1; seed <= cases(100); ++seed) {
-        CAPTURE(seed);
-        Random random(static_cast<std::uint64_t>(seed));
-        const double radius = random.number(0.1, 2.0), edge = random.number(0.01, 1.7) * radius;
-        const double around = edge / std::numbers::sqrt3, height = std::sqrt(radius * radius - around * around);
-        const auto corner = [&](int k) {
-            const double angle = 2 * std::numbers::pi * k / 3;
-            return Vector3<double>(around * std::cos(angle), around * std::sin(angle), height);
-        };
-        const Triangle<double> triangle{corner(0), corner(1), corner(2)};
-        const double distance = std::sqrt(closest_point<double>(triangle, {0, 0, 0}).squared_distance);
-        REQUIRE(tool_radius(radius, edge) == Approx(distance).epsilon(1e-12));
-    }
-}
-
 TEST_CASE("constants that cannot be calibrated are refused by name", "[calibration][bad]") {
     const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
     using test::refusal;
@@ -245,10 +229,4 @@ TEST_CASE("constants that cannot be calibrated are refused by name", "[calibrati
           "Foundation: poisson_ratio must be 0 to 0.49, got 0.495");
     CHECK(refusal([&] { std::ignore = tangential_stiffnesses(mesh, layer); }) ==
           "Foundation: poisson_ratio must be 0 to 0.49, got 0.495");
-    CHECK(refusal([&] { std::ignore = tool_radius(0, 1); }) ==
-          "tool_radius: radius must be finite and positive [m], got 0");
-    CHECK(refusal([&] { std::ignore = tool_radius(1, -1); }) ==
-          "tool_radius: edge must be finite and positive [m], got -1");
-    CHECK(refusal([&] { std::ignore = tool_radius(0.5, std::sqrt(3.0)); }) ==
-          "tool_radius: radius must be more than 1 [m] for triangles with this edge, got 0.5");
 }

@@ -22,8 +22,7 @@ def membrane_of(rings):
 def forces(rings, ticks=400):
     """At equilibrium, and after that many ticks of the solver [N]."""
     mesh, network, foundation = membrane_of(rings)
-    radius = membrane.tool_radius(RADIUS, membrane.mean_edge(mesh))
-    tool = membrane.Tool(position=(0, 0, 10e-3 + RADIUS - DEPTH), radius=radius)
+    tool = membrane.Tool(position=(0, 0, 10e-3 + RADIUS - DEPTH), radius=RADIUS)
     tree, tracker = membrane.AabbTree(mesh), membrane.ContactTracker(mesh)
     solver = membrane.QuasiStaticSolver(network, layers=membrane.unlimited, sweeps=4)
     x = mesh.positions.copy()

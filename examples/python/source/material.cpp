@@ -59,7 +59,6 @@ void bind_material(py::module_& module) {
     module.def(
         "vertex_areas", [](const Mesh& mesh) { return copy(membrane::vertex_areas(mesh)); }, py::arg("mesh"),
         doc("vertex_areas"));
-    module.def("tool_radius", &membrane::tool_radius, py::arg("radius"), py::arg("edge"), doc("tool_radius"));
     module.def("flexural_rigidity", &membrane::flexural_rigidity, py::arg("material"), doc("flexural_rigidity"));
 
     using Layers = membrane::RecommendedLayers;

@@ -75,6 +75,7 @@ const handlers = {
       times: new Float64Array(loop.times()),
       force: loop.force(),
       tool: now.tool.position,
+      radius: loop.drawnRadius(),
       touching: now.contact.touching,
       holding: now.grasp.triangle >= 0,
     };

@@ -197,6 +197,7 @@ export class Scene {
     this.outline(state.boxes);
     this.tool.visible = true;
     this.tool.position.fromArray(state.tool).divideScalar(this.size);
+    if (state.radius) this.tool.scale.setScalar(state.radius / this.size);
     this.point(new THREE.Vector3().fromArray(state.force));
   }
 

@@ -58,12 +58,11 @@ struct MeshError {
 ///
 /// In 96 random scenes (`tests/run --long -R 'error of a mesh'`) on regular and irregular meshes of 91 to 400 vertices,
 /// the estimate was compared with the error against meshes of 4,921: pressure on a disc, a glued patch with and without
-/// a foundation, balls with and without `tool_radius`, two balls, a cornea and a lens capsule under pressure. It was
-/// within a factor of 2 in all 70 but those of a ball that touches less than a triangle, and of these in 20 of 26; a
-/// recovery of the gradient was in 52 of the 96.
+/// a foundation, balls by default and by faces alone, two balls, a cornea and a lens capsule under pressure. It was
+/// within a factor of 2 in 69 of 70 scenes, and in 18 of 26 of a ball that touches less than a triangle; a recovery of
+/// the gradient was in 52 of the 96.
 /// It does not hold
-/// - for a tool that touches less than a triangle. Where `tool_radius` keeps it from touching at all, `error()` is
-///   infinite, or 1 in magnitude;
+/// - for a tool that touches less than a triangle;
 /// - for the position of a point within a triangle: its error depends on where in the triangle it is. A volume, a mean,
 ///   or the position of a vertex that both meshes have converges evenly;
 /// - for what both meshes have in common: a border, a patch or a curved surface that `between` does not follow, bending

@@ -42,7 +42,7 @@ struct TrackerOptions {
     Index max_contact_points = 16384;  ///< capacity for contact points; determines memory, not time
     /// The largest circumradius of triangles whose vertices carry the contact, see `ContactVertices`; the others carry
     /// it with their faces. 0: all do. More than 0.5 is for shallow contacts: deep ones stretch triangles [tool radii].
-    double fine_triangles = 0;
+    double fine_triangles = 0.5;
 };
 
 /// Without contact, or if the tool has moved by more than a mean edge in the tick, queries the tree. Otherwise tests
@@ -55,10 +55,9 @@ struct TrackerOptions {
 /// displacement. A second fold of the surface that approaches a tool in contact is found within `full_query_interval`
 /// ticks; beyond a tear, at once.
 ///
-/// A contact begins if the gap is not positive; where vertices carry it, if one is no farther from the tool than its
-/// lift. It ends if the gap beyond the lift is positive and either the tool has left the rest surface or the gap
-/// exceeds depth plus travel of the tool: a membrane that springs back stays in contact. After tunnelling, faces carry
-/// it.
+/// A contact begins if the gap is not positive; where vertices carry it, if one is no farther off than its lift. It
+/// ends if the gap beyond the lift is positive and the tool has left the rest surface, or the gap exceeds depth plus
+/// the tool's travel: a membrane that springs back stays in contact. After tunnelling, faces carry it.
 ///
 /// The tool stays outside a closed surface: where the winding number is 0. At an open surface the tool stays on the
 /// side of first contact. If that contact is on a border, the side is fixed when the contact has left the border, or
@@ -70,7 +69,7 @@ struct TrackerOptions {
 /// The rest surface is the mesh, or the anchors of a moving body, even where the membrane is torn. Depth is measured
 /// against it, that of a shaft at its deepest point, on the side where the tool entered: it grows beyond the middle of
 /// a body, too, and beyond its other wall by as much as the body is thick. If the tool is outside the rest surface and
-/// the membrane lies farther out, there is no contact: a contact must not pull.
+/// the membrane lies farther out or is pierced, there is no contact: a contact must not pull.
 template <Real Scalar>
 class ContactTracker : public SplitCount {
   public:
@@ -423,10 +422,10 @@ bool ContactTracker<Scalar>::contacts(const Scene& scene, Contact<Scalar>& conta
     return gap <= margin_ / 1000 || (is_pressed_in && gap <= rebound + scene.travel);
 }
 
-// Whether the active triangle or a corner that carries the contact is as near to the tool as it may be.
+// Whether the tool touches the active triangle, or a corner that carries the contact is as near to it as it may be.
 template <Real Scalar>
 bool ContactTracker<Scalar>::touches(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
-    if (contact.patch.tunnelled || contact.gap <= vertices_.face_lift(contact.corners, scene.radius)) return true;
+    if (contact.patch.tunnelled || contact.gap <= 0) return true;
     return std::any_of(contact.corners.begin(), contact.corners.end(), [&](Index v) {
         const auto from_axis = to_segment(membrane::point(scene.x, v), scene.tool.position, scene.tool.axis);
         return vertices_.carries(v, scene.radius) && norm(from_axis) <= scene.radius + vertices_.lift(v, scene.radius);
@@ -891,21 +890,20 @@ bool ContactTracker<Scalar>::leaves_border(const Scene& scene, const Contact<Sca
     return norm<Scalar>(contact.point - origin) > margin_;
 }
 
-// Whether the contact would pull: the tool is outside the rest surface, and the membrane lies farther out.
+// Whether the contact would pull: the tool is outside the rest surface, and the membrane farther out or pierced.
 template <Real Scalar>
 bool ContactTracker<Scalar>::is_hooked(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
     const auto overlapped = [&](Index f) {
         const auto before = closest_to_axis(surface_.triangle(scene.anchors, f), scene.tool).on_triangle;
         return before.squared_distance < scene.radius * scene.radius;
     };
-    // A shaft may be inside between the points where its depth is measured.
-    const auto nearby = near_.items();
-    if (contact.depth > 0 || overlapped(contact.triangle) || std::any_of(nearby.begin(), nearby.end(), overlapped)) {
-        return false;
-    }
+    const auto nearby = near_.items();  // a shaft may be inside between the points where its depth is measured
+    if (contact.depth > 0 || overlapped(contact.triangle)) return false;
+    if (std::any_of(nearby.begin(), nearby.end(), overlapped)) return false;
     const Index f = origin_triangles_[is_shaft(scene.tool) ? 2 : 0];
     const auto nearest = closest_point(at_rest().triangle(scene.anchors, f), contact.patch.axis_point);
-    return dot<Scalar>(contact.normal, contact.patch.axis_point - nearest.point) < 0;
+    return pierces(scene, contact.triangle) ||
+           dot<Scalar>(contact.normal, contact.patch.axis_point - nearest.point) < 0;
 }
 
 }  // namespace membrane

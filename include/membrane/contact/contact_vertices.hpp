@@ -11,7 +11,7 @@
 
 /// Which vertices carry a contact, and how far outside the tool they stay.
 ///
-///     auto tracker = membrane::ContactTracker(mesh, {.fine_triangles = 0.5});
+///     auto tracker = membrane::ContactTracker(mesh);
 ///     const auto contact = tracker.update(tree, x, tool);
 ///     for (const auto& point : contact.patch.points) {
 ///         if (point.feature == membrane::vertex_feature) std::printf("%g m outside\n", point.lift);

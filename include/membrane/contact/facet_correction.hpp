@@ -47,8 +47,8 @@ struct FacetCorrectionOptions {
 ///
 /// On 2,500 vertices of a disc, balls of 3 to 12 edges in radius and 0.1 to 0.5 radii deep have the force of CalculiX
 /// within 1.1 % (without: 1 to 18 % too large), see bench/README.md; on irregular triangles within 4 %.
-/// Use the tool's own radius, without `tool_radius`. For spheres, on a sheet under tension whose decay length sqrt(T /
-/// c) on a foundation of stiffness c per area is above an edge, away from fixed vertices.
+/// For spheres, on a sheet under tension whose decay length sqrt(T / c) on a foundation of stiffness c per area is more
+/// than an edge, away from fixed vertices, with contact by faces alone: `ContactTracker(mesh, {.fine_triangles = 0})`.
 ///
 /// The offset depends on the force and the force on the offset: half a step from tick to tick converges, for a ratio of
 /// the depths with and without triangles of up to 4. One instance serves any number of tools and threads.
@@ -59,8 +59,8 @@ class FacetCorrection {
     FacetCorrection(const TriangleMesh<Scalar>& mesh, const FacetCorrectionOptions& options);
 
     /// The displacement of the tool from where it is to where it must press, along `reaction`, the force on it [N];
-    /// zero without a contact or a force, or if a number is not finite or a vertex not there. `contact` is the one that
-    /// the step had, `x` the positions [m].
+    /// zero without a contact or a force, where vertices may carry it, or if a number is not finite or a vertex not
+    /// there. `contact` is the one that the step had, `x` the positions [m].
     /// Online. Cost: linear in `contact.patch.triangles`.
     [[nodiscard]] Vector3<Scalar> operator()(const ConstPointsRef<Scalar>& x, const Contact<Scalar>& contact,
                                              const Vector3<Scalar>& reaction) const noexcept;
@@ -201,7 +201,9 @@ template <Real Scalar>
 Vector3<Scalar> FacetCorrection<Scalar>::operator()(const ConstPointsRef<Scalar>& x, const Contact<Scalar>& contact,
                                                     const Vector3<Scalar>& reaction) const noexcept {
     const Scalar force = norm(reaction);
-    if (!contact.touching() || !is_finite(force) || !(force > 0)) return Vector3<Scalar>::Zero();
+    if (contact.patch.fine_triangles > 0 || !contact.touching() || !is_finite(force) || !(force > 0)) {
+        return Vector3<Scalar>::Zero();
+    }
     const auto is_here = [&](const auto& at) { return are_vertices(at.corners, x.cols()); };
     const bool fits = static_cast<std::size_t>(x.cols()) == edge_.size() && is_here(contact) &&
                       std::all_of(contact.patch.triangles.begin(), contact.patch.triangles.end(), is_here);
