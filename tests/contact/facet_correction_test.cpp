@@ -226,9 +226,10 @@ TEST_CASE("no offset without a ball's force, and what is refused") {
     const Point offset = correction(x, contact, {0, 0, 1e-4});
     CHECK(offset.z() > 0);
     CHECK(std::hypot(offset.x(), offset.y()) == 0);
-    contact.patch.fine_triangles = 0.5;  // vertices may carry it
+    const membrane::ContactPoint<double> of_vertex{.feature = membrane::vertex_feature};
+    contact.patch.points = {&of_vertex, 1};
     CHECK(correction(x, contact, {0, 0, 1e-4}).isZero(0));
-    contact.patch.fine_triangles = 0;
+    contact.patch.points = {};
 
     Points<double> wild = x;
     for (const Index v : contact.corners) wild.col(v).setConstant(std::numeric_limits<double>::quiet_NaN());

@@ -12,6 +12,7 @@
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/surface/moving_body.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tissue/spring_stiffness.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -338,5 +339,24 @@ TEST_CASE("a held point stays the same point of the tissue if a vertex moves at 
         const auto grasp = grasper.update(contact, x, tool);
         REQUIRE(norm<double>(point_at(triangle_at(x, grasp.corners), grasp.barycentric) - held) < 1e-14);
         REQUIRE(grasp.offset == before.offset);
+    }
+}
+
+TEST_CASE("forceps hold what is under them, whether vertices or faces carry the contact", "[grasp]") {
+    const auto mesh = icosphere<double>({.radius = 0.01, .subdivisions = 3});
+    const AabbTree<double> tree(mesh);
+    const double edge = mean_edge(mesh);
+    for (int seed = 1; seed <= cases(2400); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto triangle = triangle_at(mesh.positions(), mesh.triangles().col(random.index(mesh.triangle_count())));
+        const Vector3<double> place = point_at<double>(triangle, random.barycentric()), up = place / norm(place);
+        const double radius = edge * random.number(0.7, 4.0), depth = radius * random.number(0.005, 0.05);
+        Tool<double> tool{.position = place + (radius - depth) * up, .radius = radius, .grasping = true};
+        ContactTracker<double> tracker(mesh, {.fine_triangles = seed % 2 == 0 ? 0 : 0.5});
+        const auto contact = tracker.update(tree, mesh.positions(), tool);
+        const auto grasp = Grasper<double>(mesh).update(contact, mesh.positions(), tool);
+        REQUIRE(grasp.holding());
+        REQUIRE(norm<double>(cross<double>(grasp.offset, up)) < 0.3 * edge);
     }
 }

@@ -368,6 +368,24 @@ TEST_CASE("no shaft that is dragged over a free border is left with the membrane
     }
 }
 
+TEST_CASE("forceps hold nothing once a shaft is back that had gone round a free border", "[withdrawal]") {
+    const double fine = GENERATE(0.0, 0.5);
+    Scene scene = free_sheet({.fine_triangles = fine});
+    const Point from(0.0088, 0.0267, -0.0053), to(0.0084, 0.0067, -0.0041);
+    Tool<double> shaft{.axis = {-0.002, 0.008, 0.0087}, .radius = 0.91e-3};
+    bool touched = false;
+    for (int tick = 0; tick < 1200; ++tick) {
+        shaft.position = from + (ramp(tick, 0, 400) - 1.5 * ramp(tick, 600, 1200)) * (to - from);
+        scene.tick(shaft);
+        touched |= scene.contact.touching();
+    }
+    CHECK(touched);
+    CHECK_FALSE(scene.contact.touching());
+    shaft.grasping = true;
+    scene.tick(shaft);
+    CHECK_FALSE(scene.grasper.update(scene.contact, scene.x, shaft).holding());
+}
+
 // One or two in a hundred are not at rest after a second, one in two hundred has its axis inside until it is withdrawn.
 TEST_CASE("a shaft thinner than an edge, two edges deep, stays outside a closed surface and leaves it",
           "[withdrawal]") {

@@ -48,7 +48,7 @@ struct ContactPatch {
     std::span<const ContactTriangle> triangles, candidates, faces;
     ///@}
 
-    double fine_triangles = 0;  ///< of `TrackerOptions`: whether vertices carry the contact, see `ContactVertices`
+    double fine_triangles = 0;  ///< of `TrackerOptions`; above 0, vertices may carry the contact
 };
 
 /// The contact of the tool with the membrane: position, depth and phase.

@@ -414,6 +414,9 @@ bool ContactTracker<Scalar>::contacts(const Scene& scene, Contact<Scalar>& conta
     const auto lift = static_cast<Scalar>(vertices_.largest_lift(contact.corners, scene.radius));
     const Scalar gap = contact.gap - lift;
     if (gap > 0 && (side_.slid_off() || is_below_border(scene, contact))) return false;
+    const Triangle<Scalar> origin = surface_.triangle(scene.anchors, contact.triangle);
+    const Scalar displaced = norm<Scalar>(contact.point - point_at(origin, contact.barycentric));
+    if (gap > surface_.mean_edge() && displaced <= margin_) return false;  // nothing springs back
     const Scalar rebound = measure_depth(scene, contact);
     const bool is_pressed_in = contact.depth + lift > 0;
     contact.depth = (std::max)(Scalar(0), contact.depth);

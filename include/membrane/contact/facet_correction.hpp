@@ -20,6 +20,7 @@
 
 /// A ball on a mesh whose triangles are not smaller than its contact.
 ///
+///     auto tracker = membrane::ContactTracker(mesh, {.fine_triangles = 0});               // by faces
 ///     const membrane::FacetCorrection<double> correction(mesh, {.tension = 1.8, .stiffness = 50});    // [N/m]
 ///     auto pressed = tool;
 ///     pressed.position += offset;                                             // Vector3, zero at the start
@@ -59,7 +60,7 @@ class FacetCorrection {
     FacetCorrection(const TriangleMesh<Scalar>& mesh, const FacetCorrectionOptions& options);
 
     /// The displacement of the tool from where it is to where it must press, along `reaction`, the force on it [N];
-    /// zero without a contact or a force, where vertices may carry it, or if a number is not finite or a vertex not
+    /// zero without a contact or a force, where vertices carry it, or if a number is not finite or a vertex not
     /// there. `contact` is the one that the step had, `x` the positions [m].
     /// Online. Cost: linear in `contact.patch.triangles`.
     [[nodiscard]] Vector3<Scalar> operator()(const ConstPointsRef<Scalar>& x, const Contact<Scalar>& contact,
@@ -201,9 +202,10 @@ template <Real Scalar>
 Vector3<Scalar> FacetCorrection<Scalar>::operator()(const ConstPointsRef<Scalar>& x, const Contact<Scalar>& contact,
                                                     const Vector3<Scalar>& reaction) const noexcept {
     const Scalar force = norm(reaction);
-    if (contact.patch.fine_triangles > 0 || !contact.touching() || !is_finite(force) || !(force > 0)) {
-        return Vector3<Scalar>::Zero();
-    }
+    if (!contact.touching() || !is_finite(force) || !(force > 0)) return Vector3<Scalar>::Zero();
+    const auto& points = contact.patch.points;
+    const auto is_vertex = [](const auto& point) { return point.feature == vertex_feature; };
+    if (std::any_of(points.begin(), points.end(), is_vertex)) return Vector3<Scalar>::Zero();
     const auto is_here = [&](const auto& at) { return are_vertices(at.corners, x.cols()); };
     const bool fits = static_cast<std::size_t>(x.cols()) == edge_.size() && is_here(contact) &&
                       std::all_of(contact.patch.triangles.begin(), contact.patch.triangles.end(), is_here);

@@ -160,7 +160,7 @@ Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const Cons
 }
 
 // At equilibrium the tool touches several triangles, and rounding decides which is the nearest. So the mean of those
-// equally near counts, each less the less near it is.
+// equally near counts, each less the less near it is, whether they carry the contact or their vertices do.
 template <Real Scalar>
 void Grasper<Scalar>::take_point(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
                                  const Tool<Scalar>& tool) noexcept {
@@ -173,21 +173,30 @@ void Grasper<Scalar>::take_point(const Contact<Scalar>& contact, const ConstPoin
     if (contact.patch.tunnelled) return;
     constexpr Scalar infinity = std::numeric_limits<Scalar>::infinity();
     Scalar least = infinity, sum = 0, nearest = infinity;
-    for (const auto& point : contact.patch.points) least = (std::min)(least, point.gap);
+    const auto each_point = [&, farthest = contact.patch.detection_distance - contact.patch.radius](const auto& visit) {
+        for (const auto& [f, corners, lift] : contact.patch.triangles) {
+            const auto triangle = triangle_at(x, corners);
+            for (int feature = 0; feature < feature_pairs(tool); ++feature) {
+                const auto point = contact_point(f, corners, triangle, tool, feature, contact.patch.radius);
+                if (point && point->gap <= farthest) visit(*point);
+            }
+        }
+    };
+    each_point([&](const auto& point) { least = (std::min)(least, point.gap); });
     Vector3<Scalar> normal = Vector3<Scalar>::Zero(), axis_point = Vector3<Scalar>::Zero();
-    for (const auto& point : contact.patch.points) {
+    each_point([&](const auto& point) {
         const Scalar weight = 1 - 64 * (point.gap - least) / contact.patch.radius;
-        if (!(weight > 0)) continue;
+        if (!(weight > 0)) return;
         const Vector3<Scalar> here =
             point_at(triangle_at(x, point.corners), point.weights) + (point.gap + contact.patch.radius) * point.normal;
         sum += weight;
         normal += weight * point.normal;
         axis_point += weight * here;
         const Scalar from_tip = squared_norm<Scalar>(here - tool.position);
-        if (!is_shaft(tool) || !(from_tip < nearest)) continue;
+        if (!is_shaft(tool) || !(from_tip < nearest)) return;
         nearest = from_tip;
         hold(point.triangle, point.corners, point.weights);
-    }
+    });
     if (!(sum > 1) || !(norm(normal) > sum / 8)) return;
     const Vector3<Scalar> from = axis_point / sum, to = from - 4 * contact.patch.radius * direction(normal, normal);
     Scalar first = infinity;

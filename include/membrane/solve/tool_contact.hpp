@@ -24,10 +24,10 @@
 ///     report.reactions[0];                                                   // force of the membrane on the tool [N]
 namespace membrane {
 
-/// Keeps the surface outside the tool, without friction. Each pair of a triangle in contact and a feature of the tool
-/// (its centre, an end of a shaft, a shaft against an edge) has one contact point. There a force along the normal
-/// pushes and never pulls; barycentric weights distribute it to the corners. A vertex that carries the contact, see
-/// `ContactVertices`, has one contact point for all features, whose force its updates find.
+/// Keeps the vertices and faces that carry the contact outside the tool, see `ContactVertices`, without friction. Each
+/// pair of such a face and a feature of the tool (its centre, an end of a shaft, a shaft against an edge) has one
+/// contact point. There a force along the normal pushes and never pulls; barycentric weights distribute it to the
+/// corners. A vertex has one contact point for all features, whose force its updates find.
 ///
 /// Fixed corners (pinned or prescribed) do not move. They resist with a penalty force, the penetration times
 /// `SolverOptions::rigid_stiffness`: at triangles with fixed corners a penetration of force over stiffness remains. If
