@@ -215,6 +215,17 @@ TEST_CASE("a tool in a triangle is in contact, and has none inside it if drawn w
     CHECK(smaller > 0);
 }
 
+TEST_CASE("by default vertices carry the contact of a ball of ten edges", "[contact]") {
+    const Mesh mesh = membrane::icosphere<double>({.radius = 5e-3, .subdivisions = 2});
+    const Point vertex = membrane::point(mesh.positions(), 0), up = vertex / membrane::norm(vertex);
+    const double radius = 10 * membrane::LocalSurface<double>(mesh).mean_edge();
+    const membrane::Tool<double> ball{.position = vertex + 0.99 * radius * up, .radius = radius};
+    Tracker tracker(mesh);
+    const auto contact = tracker.update(membrane::AabbTree<double>(mesh), mesh.positions(), ball);
+    REQUIRE(!contact.patch.points.empty());
+    for (const auto& point : contact.patch.points) CHECK(point.feature == vertex_feature);
+}
+
 TEST_CASE("fine_triangles out of range is refused", "[contact]") {
     const auto mesh = membrane::icosphere<double>({});
     const auto of = [&](double fine) { return test::refusal([&] { Tracker(mesh, {.fine_triangles = fine}); }); };

@@ -183,7 +183,15 @@ class ContactTracker : public SplitCount {
         return direction<Scalar>(area_vector(at_rest().triangle(scene.anchors, f)), Vector3<Scalar>::Zero());
     }
     [[nodiscard]] bool is_below_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
-    [[nodiscard]] bool leaves_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
+    // Whether the tool is below a border that is displaced.
+    [[nodiscard]] bool leaves_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
+        return contact.triangle != no_index && is_below_border(scene, contact) && is_displaced(scene, contact);
+    }
+    // Whether the touched point is displaced by more than the margin.
+    [[nodiscard]] bool is_displaced(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
+        const auto origin = surface_.triangle(scene.anchors, contact.triangle);
+        return norm<Scalar>(contact.point - point_at(origin, contact.barycentric)) > margin_;
+    }
     [[nodiscard]] bool is_side_certain(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
     [[nodiscard]] bool is_hooked(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
 
@@ -414,9 +422,7 @@ bool ContactTracker<Scalar>::contacts(const Scene& scene, Contact<Scalar>& conta
     const auto lift = static_cast<Scalar>(vertices_.largest_lift(contact.corners, scene.radius));
     const Scalar gap = contact.gap - lift;
     if (gap > 0 && (side_.slid_off() || is_below_border(scene, contact))) return false;
-    const Triangle<Scalar> origin = surface_.triangle(scene.anchors, contact.triangle);
-    const Scalar displaced = norm<Scalar>(contact.point - point_at(origin, contact.barycentric));
-    if (gap > surface_.mean_edge() && displaced <= margin_) return false;  // nothing springs back
+    if (gap > surface_.mean_edge() && !is_displaced(scene, contact)) return false;  // nothing springs back
     const Scalar rebound = measure_depth(scene, contact);
     const bool is_pressed_in = contact.depth + lift > 0;
     contact.depth = (std::max)(Scalar(0), contact.depth);
@@ -883,14 +889,6 @@ bool ContactTracker<Scalar>::is_below_border(const Scene& scene, const Contact<S
     if (contact.patch.tunnelled || !surface_.on_border(contact.triangle, contact.barycentric)) return false;
     const auto outward = surface_.outward(scene.x, contact.triangle, contact.barycentric);
     return contact.patch.side * dot<Scalar>(contact.normal, outward) < 0;
-}
-
-// Whether the tool is below a border that is displaced by more than the margin.
-template <Real Scalar>
-bool ContactTracker<Scalar>::leaves_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
-    if (contact.triangle == no_index || !is_below_border(scene, contact)) return false;
-    const Vector3<Scalar> origin = point_at(surface_.triangle(scene.anchors, contact.triangle), contact.barycentric);
-    return norm<Scalar>(contact.point - origin) > margin_;
 }
 
 // Whether the contact would pull: the tool is outside the rest surface, and the membrane farther out or pierced.
