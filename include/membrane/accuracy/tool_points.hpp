@@ -117,13 +117,11 @@ inline std::vector<ToolPoint> tool_points(const Triangles& triangles, const Poin
                 point.gap -= point.lift;
                 if (!point.normal.isZero(0) && point.gap <= max_distance) points.push_back(point);
             }
-            for (int feature = 0; feature < feature_pairs(tool); ++feature) {
-                auto point = contact_point(f, corners, triangle, tool, feature, tool.radius);
-                if (!point || point->normal.isZero(0)) continue;
-                point->lift = vertices.face_lift(corners, tool.radius);
-                point->gap -= point->lift;
-                if (point->gap <= max_distance) points.push_back({*point, i});
-            }
+            each_contact_point(f, corners, triangle, tool, tool.radius, [&](ContactPoint<double> point) {
+                point.lift = vertices.face_lift(corners, tool.radius);
+                point.gap -= point.lift;
+                if (!point.normal.isZero(0) && point.gap <= max_distance) points.push_back({point, i});
+            });
         }
     }
     // Of faces that share their nearest point, the one that may cut in least comes first.

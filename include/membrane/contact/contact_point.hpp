@@ -56,6 +56,15 @@ template <Real Scalar>
     return point;
 }
 
+/// Visits the contact points of triangle `f` and all features of the tool, see `contact_point`.
+template <Real Scalar, class Visit>
+void each_contact_point(Index f, const std::array<Index, 3>& corners, const Triangle<Scalar>& triangle,
+                        const Tool<Scalar>& tool, Scalar radius, const Visit& visit) noexcept {
+    for (int feature = 0; feature < feature_pairs(tool); ++feature) {
+        if (const auto point = contact_point(f, corners, triangle, tool, feature, radius)) visit(*point);
+    }
+}
+
 /// The contact point of vertex `v`, at `p` [m], a corner of triangle `f` that carries the contact with this lift [m],
 /// without force. `radius` is the tool's [m].
 template <Real Scalar>

@@ -685,14 +685,10 @@ void ContactTracker<Scalar>::find_points(const Scene& scene, Contact<Scalar>& co
         point.lift = static_cast<Scalar>(lift);
         if (!points_.try_push_back(point)) contact.patch.has_all_points = false;
     };
-    const int features = feature_pairs(scene.tool);
-    if (features == 1) return find_points_of_sphere(scene, contact.patch.faces, list);
-    for (const auto& [f, corners, lift] : contact.patch.faces) {
-        const auto triangle = triangle_at(scene.x, corners);
-        for (int feature = 0; feature < features; ++feature) {
-            const auto point = contact_point(f, corners, triangle, scene.tool, feature, scene.radius);
-            if (point) list(*point, lift);
-        }
+    if (feature_pairs(scene.tool) == 1) return find_points_of_sphere(scene, contact.patch.faces, list);
+    for (const auto& face : contact.patch.faces) {
+        each_contact_point(face.triangle, face.corners, triangle_at(scene.x, face.corners), scene.tool, scene.radius,
+                           [&](const auto& point) { list(point, face.lift); });
     }
 }
 

@@ -118,6 +118,11 @@ class Grasper {
     }
 
   private:
+    void hold(Index triangle, const std::array<Index, 3>& corners, const Vector3<Scalar>& barycentric) noexcept {
+        grasp_.triangle = triangle;
+        grasp_.corners = corners;
+        grasp_.barycentric = barycentric;
+    }
     void take_point(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x, const Tool<Scalar>& tool) noexcept;
 
     Points<Scalar> origins_;
@@ -164,29 +169,21 @@ Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const Cons
 template <Real Scalar>
 void Grasper<Scalar>::take_point(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
                                  const Tool<Scalar>& tool) noexcept {
-    const auto hold = [&](Index triangle, const std::array<Index, 3>& corners, const Vector3<Scalar>& barycentric) {
-        grasp_.triangle = triangle;
-        grasp_.corners = corners;
-        grasp_.barycentric = barycentric;
-    };
     hold(contact.triangle, contact.corners, contact.barycentric);
     if (contact.patch.tunnelled) return;
     constexpr Scalar infinity = std::numeric_limits<Scalar>::infinity();
     Scalar least = infinity, sum = 0, nearest = infinity;
-    const auto each_point = [&, farthest = contact.patch.detection_distance - contact.patch.radius](const auto& visit) {
+    const Scalar farthest = contact.patch.detection_distance - contact.patch.radius;
+    const auto each_point = [&](const auto& visit) {
         for (const auto& [f, corners, lift] : contact.patch.triangles) {
-            const auto triangle = triangle_at(x, corners);
-            for (int feature = 0; feature < feature_pairs(tool); ++feature) {
-                const auto point = contact_point(f, corners, triangle, tool, feature, contact.patch.radius);
-                if (point && point->gap <= farthest) visit(*point);
-            }
+            each_contact_point(f, corners, triangle_at(x, corners), tool, contact.patch.radius, visit);
         }
     };
     each_point([&](const auto& point) { least = (std::min)(least, point.gap); });
     Vector3<Scalar> normal = Vector3<Scalar>::Zero(), axis_point = Vector3<Scalar>::Zero();
     each_point([&](const auto& point) {
         const Scalar weight = 1 - 64 * (point.gap - least) / contact.patch.radius;
-        if (!(weight > 0)) return;
+        if (!(weight > 0) || point.gap > farthest) return;
         const Vector3<Scalar> here =
             point_at(triangle_at(x, point.corners), point.weights) + (point.gap + contact.patch.radius) * point.normal;
         sum += weight;
@@ -240,9 +237,7 @@ void Grasper<Scalar>::reshape(const MovedVertex<Scalar>& moved) noexcept {
         const auto nearest = closest_point(at(one.after), rest);
         if (!(nearest.squared_distance < least)) continue;
         least = nearest.squared_distance;
-        grasp_.triangle = one.triangle;
-        grasp_.corners = one.corners;
-        grasp_.barycentric = nearest.barycentric;
+        hold(one.triangle, one.corners, nearest.barycentric);
     }
 }
 
