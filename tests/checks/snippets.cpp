@@ -140,6 +140,16 @@ extern const membrane::ForceTable table;
 extern const double mean, deviation_of_mean;
 // [/calibration/student_t]
 
+// [coarse/coarse_points]
+extern const std::vector<membrane::Vector3<double>> of_point;
+extern membrane::Vector3<double> displacement;
+// [/coarse/coarse_points]
+
+// [coarse/element_forces]
+extern std::vector<membrane::PaddedPoint<double>> forces;
+extern const std::vector<membrane::PaddedPoint<double>> x;
+// [/coarse/element_forces]
+
 // [certify/contact_bounds]
 extern const membrane::Points<double> force;
 // [/certify/contact_bounds]

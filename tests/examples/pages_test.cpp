@@ -100,6 +100,10 @@
 #include <membrane/tissue/tissue.hpp>
 // [/tear]
 
+// [coarse]
+#include <membrane/coarse/coarse_correction.hpp>
+// [/coarse]
+
 // [equilibrium]
 #include <membrane/accuracy/equilibrium.hpp>
 // [/equilibrium]
@@ -821,6 +825,29 @@ TEST_CASE("pages: tear") {
     // [/tear]
     CHECK(report.status == membrane::StepStatus::advanced);
     CHECK(tear.tips().size() == 2);
+}
+
+TEST_CASE("pages: coarse") {
+    const auto mesh = membrane::disc<double>({.radius = 0.005, .rings = 12});
+    const auto rest = membrane::border(mesh);
+    const membrane::MassSpringNetwork network(mesh, membrane::LinearSpring{}, {.stiffness = 20.0, .pinned = rest});
+    const membrane::NoFoundation foundation;
+    auto solver = membrane::QuasiStaticSolver(network);
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    auto x = mesh.positions();
+    const double dt = 1e-3;
+    const membrane::Tool<double> tool{.position = {0, 0, 0.9e-3}, .radius = 1e-3};
+    // [coarse]
+    membrane::CoarseCorrection coarse(mesh, network, foundation);  // once; foundation may be NoFoundation()
+
+    const auto contact = tracker.update(tree, x, tool);
+    const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+    (void)coarse.correct(x, solver.queue());  // all vertices may have moved
+    tree.refit(x);
+    // [/coarse]
+    CHECK(report.reactions[0].z() > 0);
+    CHECK(coarse.points().count() > 60);
 }
 
 TEST_CASE("pages: a flap that forceps tear") {

@@ -13,9 +13,11 @@
 #include <membrane/accuracy/tangent_stiffness.hpp>
 #include <membrane/certify/error_bound.hpp>
 #include <membrane/certify/factored_convexity.hpp>
+#include <membrane/coarse/coarse_correction.hpp>
 #include <membrane/core/thread_pool.hpp>
 #include <membrane/replay/recording.hpp>
 #include <membrane/replay/snapshot.hpp>
+#include <membrane/surface/mesh_checks.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -128,6 +130,25 @@ TEMPLATE_TEST_CASE("a million ticks of the complete loop of a hand allocate noth
     CHECK(loop.touching > ticks / 10);
     CHECK(loop.holding > ticks / 20);
     for (const int pushed : loop.pushed) CHECK(pushed > ticks / 100);
+}
+
+TEST_CASE("nor does a coarse correction", "[allocation]") {
+    const auto mesh = disc<double>({.radius = 0.005, .rings = 10});
+    const MassSpringNetwork<double, LinearSpring> network(mesh, {}, {.stiffness = 20.0, .pinned = border(mesh)});
+    const VirtualVolumeSprings<double> foundation(mesh, {.stiffness = 0.01});
+    CoarseCorrection coarse(mesh, network, foundation);
+    QuasiStaticSolver solver(network);
+    Points<double> x = mesh.positions();
+    const long allocated = allocated_by([&] {
+        for (int i = 0; i < 100; ++i) {
+            const auto target = Vector3<double>(0, 0, -1e-5 * i);
+            (void)solver.step(x, 1e-3, network, foundation, pull(Index(0), target));
+            (void)coarse.correct(x, solver.queue());
+        }
+        coarse.reset();
+    });
+    CHECK(allocated == 0);
+    CHECK(x.row(2).minCoeff() < -5e-4);
 }
 
 TEST_CASE("nor does a step that several threads share", "[allocation]") {

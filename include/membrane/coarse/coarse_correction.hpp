@@ -1,0 +1,376 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Cholesky>
+
+#include <membrane/coarse/coarse_points.hpp>
+#include <membrane/coarse/element_forces.hpp>
+#include <membrane/core/check.hpp>
+#include <membrane/core/index_set.hpp>
+#include <membrane/core/symmetric3.hpp>
+#include <membrane/solve/propagation_queue.hpp>
+#include <membrane/surface/vertex_split.hpp>
+
+/// The coarse level of a two-level method: the right force where it reaches beyond the layers of the queue.
+///
+///     membrane::CoarseCorrection coarse(mesh, network, foundation);                     // offline
+///     const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+///     (void)coarse.correct(x, solver.queue());
+///     tree.refit(x);                                                                   // more than report.moved
+namespace membrane {
+
+/// Options of a `CoarseCorrection`.
+struct CoarseOptions {
+    Index points =
+        128;  ///< number of coarse points, roughly; at most all free vertices. More are more accurate where the
+              ///< contact is small beside their distance, as of forceps
+
+    /// @throws InvalidInput for an option out of its range
+    void validate() const;
+};
+
+/// What a correction did.
+template <Real Scalar>
+struct CoarseReport {
+    bool corrected = false;  ///< whether vertices have moved; false at equilibrium, or if a number was not finite
+    Scalar step_length = 0;  ///< by which the line search multiplied the displacement, 0 to 1
+    Scalar work = 0;         ///< of the residual forces along the whole displacement, if they did not change [J]
+};
+
+/// After a step, moves all vertices but those of layer 0 by the displacements of a few coarse points: those that
+/// balance the forces, by the stiffness at rest and a line search. A step solves for the vertices near the tool, and
+/// leaves the others where they are: where nothing but a far rim holds the membrane, it feels far too stiff. With the
+/// correction the layers may stay few.
+///
+/// The displacement of a tick is repeated in advance, as far as it repeats the one before: beyond layer 0 positions are
+/// a tick ahead of the tool. The solver need not be woken for these motions: where it moves no vertex itself, they are
+/// the equilibrium of the points. What sleeps keeps its shape between these: `wake_all` brings it to rest once the tool
+/// has left. The method and its error: README.md in this folder.
+///
+/// One thread at a time for each instance. The membrane must not tear, its anchors must not move.
+template <Real Scalar>
+class CoarseCorrection {
+  public:
+    /// Copies network and foundation, but for a foundation that does not take `Lanes`, which must outlive it.
+    /// @throws InvalidInput for a network or foundation of other vertices than the mesh's, an option out of its range,
+    /// or a stiffness at rest that is not finite, or zero. Cost: O(V log V) for each point, the cube of their number.
+    template <ElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume>
+    CoarseCorrection(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& foundation,
+                     const CoarseOptions& options = {});
+
+    /// Corrects `x` (3 x V [m]) after a step of the solver whose queue is `queue`, also a refused one. If `x` does not
+    /// have V vertices, nothing moves. Online. Cost: two evaluations of all elements, some 30 products for each vertex,
+    /// nine for each pair of points.
+    CoarseReport<Scalar> correct(PointsRef<Scalar> x, const PropagationQueue& queue) noexcept;
+
+    /// The coarse points.
+    [[nodiscard]] const CoarsePoints& points() const& noexcept { return points_; }
+    void points() && = delete;
+
+    /// Drops the displacement in advance: for a membrane that is put back to rest. Online.
+    void reset() noexcept;
+
+    /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.last_, self.ahead_, self.rows_ahead_);
+    }
+
+  private:
+    using Rows = std::vector<PaddedPoint<Scalar>>;  // of each vertex and one more, or of each point; the extra is 0
+    using Four = PaddedVector<Scalar>;
+
+    [[nodiscard]] static std::size_t at(Index i) noexcept { return static_cast<std::size_t>(i); }
+    [[nodiscard]] static Four load(const PaddedPoint<Scalar>& row) noexcept { return Four::load(row.number.data()); }
+    static void store(const Four& four, PaddedPoint<Scalar>& row) noexcept { four.store(row.number.data()); }
+    static void clear(Rows& rows) noexcept { std::fill(rows.begin(), rows.end(), PaddedPoint<Scalar>()); }
+    [[nodiscard]] static Scalar product(const Rows& a, const Rows& b) noexcept {
+        Four sum;
+        for (std::size_t i = 0; i < a.size(); ++i) sum = sum + load(a[i]) * load(b[i]);
+        return sum.sum();
+    }
+
+    template <class Network, class Volume>
+    void invert_stiffness(const Points<double>& rest, const Network& network, const Volume& volume);
+
+    // In the order of a correction.
+    void begin(const PointsRef<Scalar>& x, const PropagationQueue& queue) noexcept;
+    void find_residual() noexcept;
+    [[nodiscard]] bool is_balanced() const noexcept;
+    void solve() noexcept;
+    void hold_contact() noexcept;
+    void interpolate() noexcept;
+    [[nodiscard]] Scalar work_at_trial() noexcept;
+    [[nodiscard]] Scalar repetition() const noexcept;
+    void advance(PointsRef<Scalar>& x, Scalar step_length) noexcept;
+
+    void multiply_compliance(const Rows& forces, Rows& displacements) const noexcept;
+
+    CoarsePoints points_;
+    std::vector<std::unique_ptr<ElementForces<Scalar>>> kinds_;
+    Rows compliance_;                         // of the points at rest, by columns [m/N]
+    std::vector<Scalar> tolerance_;           // of the force on each point [N]
+    Rows x_, trial_, displacement_, forces_;  // of vertices
+    Rows residual_, step_, weights_;          // of points
+    Rows last_, ahead_, rows_ahead_;          // of points, of points, of vertices
+    std::array<Rows, 3> response_;            // of the points to a force on the held vertices
+    IndexSet held_;                           // layer 0
+};
+
+template <class Network, class Volume>
+CoarseCorrection(const TriangleMesh<typename Network::Scalar>&, const Network&, const Volume&,
+                 const CoarseOptions& = {}) -> CoarseCorrection<typename Network::Scalar>;
+
+inline void CoarseOptions::validate() const {
+    if (points < 1) refuse("CoarseCorrection", "points must be at least 1, got ", points);
+}
+
+template <Real Scalar>
+template <ElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume>
+CoarseCorrection<Scalar>::CoarseCorrection(const TriangleMesh<Scalar>& mesh, const Network& network,
+                                           const Volume& foundation, const CoarseOptions& options)
+    : points_((options.validate(), mesh), network, options.points), held_(mesh.vertex_count()) {
+    static_assert(!FollowsSplit<Network>, "CoarseCorrection: the membrane must not tear");
+    constexpr bool moves = requires { foundation.body(); };
+    static_assert(!moves, "CoarseCorrection: the anchors must not move");
+    const Index count = mesh.vertex_count();
+    if (!has_vertices(foundation, count))
+        refuse("CoarseCorrection", "the foundation must be of the mesh's ", count, " vertices");
+    kinds_ = element_forces(network, foundation);
+    for (Rows* rows : {&x_, &trial_, &displacement_, &forces_, &rows_ahead_}) rows->resize(at(count) + 1);
+    for (Rows* rows : {&residual_, &step_, &weights_, &last_, &ahead_}) rows->resize(at(points_.count()));
+    for (Rows& rows : response_) rows.resize(at(points_.count()));
+    tolerance_.assign(at(points_.count()), 0);
+    for (Index v = 0; v < count; ++v) {
+        x_[at(v)].set(point(mesh.positions(), v));
+        for (const auto& [k, weight] : points_.weights(v))
+            tolerance_[at(k)] += std::abs(weight) * network.force_tolerance();
+    }
+    invert_stiffness(mesh.positions().template cast<double>(), network, foundation);
+}
+
+// The stiffness of the points at rest, by Galerkin's method, and its inverse. It gets a little more, so that it has one
+// where a flat membrane without tension does not resist bending.
+template <Real Scalar>
+template <class Network, class Volume>
+void CoarseCorrection<Scalar>::invert_stiffness(const Points<double>& rest, const Network& network,
+                                                const Volume& volume) {
+    const Eigen::Index size = 3 * points_.count();
+    Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(size, size);
+    const auto add_block = [&](Index first, Index second, const Eigen::Matrix3d& block) {
+        for (const auto& [i, a] : points_.weights(first)) {
+            for (const auto& [j, b] : points_.weights(second))
+                stiffness.block<3, 3>(3 * i, 3 * j) += static_cast<double>(a) * static_cast<double>(b) * block;
+        }
+    };
+    network.for_each_element([&](const auto& instance) {
+        const auto corners = instance.where(rest);
+        for (std::size_t i = 0; i < corners.size(); ++i) {
+            for (std::size_t j = 0; j < corners.size(); ++j)
+                add_block(instance.corners[i], instance.corners[j], instance.element.hessian_block(corners, i, j));
+        }
+    });
+    for (Index v = 0; v < network.vertex_count(); ++v) {
+        const auto here = x_[at(v)].point();
+        const auto foundation = static_cast<double>(volume.force_on(v, here, here, Scalar(1)).stiffness);
+        add_block(v, v, foundation * Eigen::Matrix3d::Identity());
+    }
+    if (size == 0) return;
+    const double largest = stiffness.cwiseAbs().maxCoeff();
+    if (!is_finite(largest) || !(largest > 0))
+        refuse("CoarseCorrection", "the stiffness at rest must be finite, and above zero, got ", largest, " N/m");
+    Eigen::LLT<Eigen::MatrixXd> factors;
+    double shift = 1e-8;
+    do {
+        factors.compute(stiffness + shift * largest * Eigen::MatrixXd::Identity(size, size));
+        shift *= 10;
+    } while (factors.info() != Eigen::Success);
+    const Eigen::MatrixXd inverse = factors.solve(Eigen::MatrixXd::Identity(size, size));
+    compliance_.reserve(static_cast<std::size_t>(size) * residual_.size());
+    for (Eigen::Index j = 0; j < size; ++j) {
+        for (Eigen::Index k = 0; k < size; k += 3) {
+            compliance_.emplace_back();
+            compliance_.back().set(Vector3<double>(inverse.block<3, 1>(k, j)).template cast<Scalar>());
+        }
+    }
+}
+
+template <Real Scalar>
+CoarseReport<Scalar> CoarseCorrection<Scalar>::correct(PointsRef<Scalar> x, const PropagationQueue& queue) noexcept {
+    if (x.cols() + 1 != static_cast<Eigen::Index>(x_.size())) return {};
+    begin(x, queue);
+    find_residual();
+    if (is_balanced()) {
+        reset();
+        return {};
+    }
+    solve();
+    interpolate();
+    CoarseReport<Scalar> report{.work = product(residual_, step_)};
+    const Scalar at_trial = work_at_trial();
+    if (!is_finite(report.work) || !is_finite(at_trial)) {
+        reset();
+        return report;
+    }
+    // By the secant method where the energy would rise again. Steps from extrapolated positions may overshoot: by less
+    // than a third they still converge.
+    const Scalar work = (std::max)(report.work, Scalar(0));
+    report.step_length = at_trial < -work / 3 ? work / (work - at_trial) : Scalar(1);
+    advance(x, report.step_length);
+    report.corrected = true;
+    return report;
+}
+
+template <Real Scalar>
+void CoarseCorrection<Scalar>::begin(const PointsRef<Scalar>& x, const PropagationQueue& queue) noexcept {
+    for (Index v = 0; v < x.cols(); ++v) x_[at(v)].set(point(x, v));
+    held_.clear();
+    for (const Index v : queue.layer(0)) held_.insert(v);
+}
+
+// The forces on the points: those on the vertices that are not held, times their weights.
+template <Real Scalar>
+void CoarseCorrection<Scalar>::find_residual() noexcept {
+    clear(forces_);
+    for (const auto& kind : kinds_) kind->add_forces(x_, forces_);
+    clear(residual_);
+    for (std::size_t v = 0; v + 1 < x_.size(); ++v) {
+        if (held_.contains(static_cast<Index>(v))) continue;
+        const Four force = load(forces_[v]);
+        for (const auto& [k, weight] : points_.weights(static_cast<Index>(v))) {
+            auto& sum = residual_[at(k)];
+            store(load(sum) + Four(static_cast<Scalar>(weight)) * force, sum);
+        }
+    }
+}
+
+template <Real Scalar>
+bool CoarseCorrection<Scalar>::is_balanced() const noexcept {
+    for (std::size_t k = 0; k < residual_.size(); ++k) {
+        if (!(norm(residual_[k].point()) <= tolerance_[k])) return false;
+    }
+    return true;
+}
+
+template <Real Scalar>
+void CoarseCorrection<Scalar>::solve() noexcept {
+    multiply_compliance(residual_, step_);
+    if (!held_.empty()) hold_contact();
+}
+
+template <Real Scalar>
+void CoarseCorrection<Scalar>::multiply_compliance(const Rows& forces, Rows& displacements) const noexcept {
+    clear(displacements);
+    auto column = compliance_.begin();
+    for (const auto& force : forces) {
+        for (std::size_t i = 0; i < 3; ++i) {
+            if (force.number[i] == 0) {
+                column += static_cast<std::ptrdiff_t>(displacements.size());
+                continue;
+            }
+            const Four by(force.number[i]);
+            for (auto& row : displacements) store(load(row) + by * load(*column++), row);
+        }
+    }
+}
+
+// The tool holds layer 0. So the mean displacement of its vertices is reduced to a third, as by a spring twice as stiff
+// as the membrane is there. Without it the points would push a fine membrane off the tool; held wholly it would not
+// follow forceps.
+template <Real Scalar>
+void CoarseCorrection<Scalar>::hold_contact() noexcept {
+    constexpr Scalar softness = 0.5;
+    clear(weights_);  // of the points in the mean, as the extra number
+    for (const Index v : held_.items()) {
+        for (const auto& [k, weight] : points_.weights(v))
+            weights_[at(k)].number[3] += static_cast<Scalar>(weight) / static_cast<Scalar>(held_.count());
+    }
+    const auto mean_of = [&](const Rows& displacements) {
+        Vector3<Scalar> mean = Vector3<Scalar>::Zero();
+        for (std::size_t k = 0; k < weights_.size(); ++k) mean += weights_[k].extra() * displacements[k].point();
+        return mean;
+    };
+    std::array<Vector3<Scalar>, 3> columns;
+    for (Eigen::Index i = 0; i < 3; ++i) {
+        Rows& one = response_[static_cast<std::size_t>(i)];
+        for (auto& weight : weights_) {
+            const Scalar part = weight.extra();
+            weight.set(part * Vector3<Scalar>::Unit(i), part);
+        }
+        multiply_compliance(weights_, one);
+        columns[static_cast<std::size_t>(i)] = mean_of(one);
+    }
+    const auto& [x, y, z] = columns;
+    const Symmetric3<Scalar> compliance{x.x(), y.y(), z.z(), x.y(), x.z(), y.z()};
+    const Vector3<Scalar> force = inverse(compliance, 1 / (1 + softness)) * mean_of(step_);
+    if (!is_finite(force)) return;
+    for (std::size_t k = 0; k < step_.size(); ++k) {
+        Four sum = load(step_[k]);
+        for (std::size_t i = 0; i < 3; ++i) sum = sum - Four(force[i]) * load(response_[i][k]);
+        store(sum, step_[k]);
+    }
+}
+
+// The displacements of all vertices, and where they would be.
+template <Real Scalar>
+void CoarseCorrection<Scalar>::interpolate() noexcept {
+    for (std::size_t v = 0; v + 1 < x_.size(); ++v) {
+        Four sum;
+        if (!held_.contains(static_cast<Index>(v))) {
+            for (const auto& [k, weight] : points_.weights(static_cast<Index>(v)))
+                sum = sum + Four(static_cast<Scalar>(weight)) * load(step_[at(k)]);
+        }
+        store(sum, displacement_[v]);
+        store(load(x_[v]) + sum, trial_[v]);
+    }
+}
+
+// The work of the forces there, per length of the step: negative where the energy rises.
+template <Real Scalar>
+Scalar CoarseCorrection<Scalar>::work_at_trial() noexcept {
+    Scalar sum = 0;
+    for (const auto& kind : kinds_) sum += kind->work(trial_, displacement_);
+    return sum;
+}
+
+// How far the displacement of this tick repeats the last one, 0 to 1. Without contact it would swing on.
+template <Real Scalar>
+Scalar CoarseCorrection<Scalar>::repetition() const noexcept {
+    const Scalar larger = (std::max)(product(step_, step_), product(last_, last_));
+    return held_.empty() || !(larger > 0) ? Scalar(0) : (std::max)(product(step_, last_), Scalar(0)) / larger;
+}
+
+// The displacement of a tick is what was added in advance, and the step.
+template <Real Scalar>
+void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length) noexcept {
+    const Four length(step_length);
+    for (std::size_t k = 0; k < step_.size(); ++k) store(length * load(step_[k]) + load(ahead_[k]), step_[k]);
+    const Scalar repeats = repetition();
+    for (std::size_t k = 0; k < step_.size(); ++k) store(Four(repeats) * load(step_[k]), ahead_[k]);
+    std::swap(last_, step_);
+    for (std::size_t v = 0; v + 1 < x_.size(); ++v) {
+        if (points_.weights(static_cast<Index>(v)).empty()) continue;
+        const Four moved = length * load(displacement_[v]);
+        const Four again = Four(repeats) * (moved + load(rows_ahead_[v]));
+        store(again, rows_ahead_[v]);
+        if (!held_.contains(static_cast<Index>(v)))
+            set_point(x, static_cast<Index>(v), (load(x_[v]) + moved + again).point());
+    }
+}
+
+template <Real Scalar>
+void CoarseCorrection<Scalar>::reset() noexcept {
+    for (Rows* rows : {&last_, &ahead_, &rows_ahead_}) clear(*rows);
+}
+
+}  // namespace membrane
