@@ -173,7 +173,7 @@ Result run(const Path& path, const M& membrane, const Setting& setting, const st
             return solver.step(x, dt, membrane.network, membrane.foundation, constraint);
         });
         if (coarse) {
-            (void)coarse->correct(x, solver.queue());
+            (void)coarse->correct(x, solver);
             tree.refit(x);
         } else {
             tree.refit(x, report.moved);

@@ -843,7 +843,7 @@ TEST_CASE("pages: coarse") {
 
     const auto contact = tracker.update(tree, x, tool);
     const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
-    (void)coarse.correct(x, solver.queue());  // all vertices may have moved
+    (void)coarse.correct(x, solver);  // all vertices may have moved
     tree.refit(x);
     // [/coarse]
     CHECK(report.reactions[0].z() > 0);

@@ -18,14 +18,13 @@
 #include <membrane/core/check.hpp>
 #include <membrane/core/index_set.hpp>
 #include <membrane/core/symmetric3.hpp>
-#include <membrane/solve/propagation_queue.hpp>
 #include <membrane/surface/vertex_split.hpp>
 
 /// The coarse level of a two-level method: the right force where it reaches beyond the layers of the queue.
 ///
 ///     membrane::CoarseCorrection coarse(mesh, network, foundation);                     // offline
 ///     const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
-///     (void)coarse.correct(x, solver.queue());
+///     (void)coarse.correct(x, solver);
 ///     tree.refit(x);                                                                   // more than report.moved
 namespace membrane {
 
@@ -42,20 +41,19 @@ struct CoarseOptions {
 /// What a correction did.
 template <Real Scalar>
 struct CoarseReport {
-    bool corrected = false;  ///< whether vertices have moved; false at equilibrium, or if a number was not finite
+    bool corrected = false;  ///< whether it displaced the membrane; false at equilibrium, or if a number was not finite
     Scalar step_length = 0;  ///< by which the line search multiplied the displacement, 0 to 1
-    Scalar work = 0;         ///< of the residual forces along the whole displacement, if they did not change [J]
 };
 
-/// After a step, moves all vertices but those of layer 0 by the displacements of a few coarse points: those that
-/// balance the forces, by the stiffness at rest and a line search. A step solves for the vertices near the tool, and
-/// leaves the others where they are: where nothing but a far rim holds the membrane, it feels far too stiff. With the
-/// correction the layers may stay few.
+/// After a step, moves all vertices but those of layer 0, pinned and prescribed ones by the displacements of a few
+/// coarse points: those that balance the forces, by the stiffness at rest and a line search. A step solves for the
+/// vertices near the tool, and leaves the others where they are: where nothing but a far rim holds the membrane, it
+/// feels far too stiff. With the correction the layers may stay few.
 ///
-/// The displacement of a tick is repeated in advance, as far as it repeats the one before: beyond layer 0 positions are
-/// a tick ahead of the tool. The solver need not be woken for these motions: where it moves no vertex itself, they are
-/// the equilibrium of the points. What sleeps keeps its shape between these: `wake_all` brings it to rest once the tool
-/// has left. The method and its error: README.md in this folder.
+/// While the contact moves, the displacement of a tick is repeated in advance, as far as it repeats the one before:
+/// beyond layer 0 positions are a tick ahead of the tool. The solver need not be woken for these motions. What sleeps
+/// keeps its shape between the points: `wake_all` brings it to rest once the tool has left. The method and its error:
+/// README.md in this folder.
 ///
 /// One thread at a time for each instance. The membrane must not tear, its anchors must not move.
 template <Real Scalar>
@@ -68,10 +66,17 @@ class CoarseCorrection {
     CoarseCorrection(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& foundation,
                      const CoarseOptions& options = {});
 
-    /// Corrects `x` (3 x V [m]) after a step of the solver whose queue is `queue`, also a refused one. If `x` does not
-    /// have V vertices, nothing moves. Online. Cost: two evaluations of all elements, some 30 products for each vertex,
-    /// nine for each pair of points.
-    CoarseReport<Scalar> correct(PointsRef<Scalar> x, const PropagationQueue& queue) noexcept;
+    ///@{
+    /// Corrects `x` (3 x V [m]) after a step of `solver`; or with layer 0 of its queue, and the prescribed vertices. If
+    /// `x` does not have V vertices, nothing moves. Online. Cost: two evaluations of all elements, some 30 products for
+    /// each vertex, nine for each pair of points.
+    template <class Solver>
+    CoarseReport<Scalar> correct(PointsRef<Scalar> x, const Solver& solver) noexcept {
+        return correct(x, solver.queue().layer(0), solver.prescribed());
+    }
+    CoarseReport<Scalar> correct(PointsRef<Scalar> x, std::span<const Index> layer_0,
+                                 std::span<const Index> prescribed) noexcept;
+    ///@}
 
     /// The coarse points.
     [[nodiscard]] const CoarsePoints& points() const& noexcept { return points_; }
@@ -83,7 +88,7 @@ class CoarseCorrection {
     /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        visit(self.last_, self.ahead_, self.rows_ahead_);
+        visit(self.x_, self.last_, self.ahead_, self.rows_ahead_);
     }
 
   private:
@@ -101,10 +106,10 @@ class CoarseCorrection {
     }
 
     template <class Network, class Volume>
-    void invert_stiffness(const Points<double>& rest, const Network& network, const Volume& volume);
+    void invert_stiffness(const Points<double>& stretched, const Network& network, const Volume& volume);
 
     // In the order of a correction.
-    void begin(const PointsRef<Scalar>& x, const PropagationQueue& queue) noexcept;
+    void begin(const PointsRef<Scalar>& x, std::span<const Index> layer_0, std::span<const Index> prescribed) noexcept;
     void find_residual() noexcept;
     [[nodiscard]] bool is_balanced() const noexcept;
     void solve() noexcept;
@@ -118,13 +123,15 @@ class CoarseCorrection {
 
     CoarsePoints points_;
     std::vector<std::unique_ptr<ElementForces<Scalar>>> kinds_;
-    Rows compliance_;                         // of the points at rest, by columns [m/N]
+    Rows compliance_;                         // of the points, by columns [m/N]
     std::vector<Scalar> tolerance_;           // of the force on each point [N]
     Rows x_, trial_, displacement_, forces_;  // of vertices
     Rows residual_, step_, weights_;          // of points
     Rows last_, ahead_, rows_ahead_;          // of points, of points, of vertices
     std::array<Rows, 3> response_;            // of the points to a force on the held vertices
-    IndexSet held_;                           // layer 0
+    IndexSet held_;                           // layer 0, then those prescribed
+    std::size_t in_contact_ = 0;              // number of the first
+    Scalar contact_motion_ = 0;               // largest displacement of one of them since the last correction [m]
 };
 
 template <class Network, class Volume>
@@ -156,14 +163,14 @@ CoarseCorrection<Scalar>::CoarseCorrection(const TriangleMesh<Scalar>& mesh, con
         for (const auto& [k, weight] : points_.weights(v))
             tolerance_[at(k)] += std::abs(weight) * network.force_tolerance();
     }
-    invert_stiffness(mesh.positions().template cast<double>(), network, foundation);
+    invert_stiffness(1.001 * mesh.positions().template cast<double>(), network, foundation);
 }
 
-// The stiffness of the points at rest, by Galerkin's method, and its inverse. It gets a little more, so that it has one
-// where a flat membrane without tension does not resist bending.
+// The stiffness of the points by Galerkin's method, and its inverse, at positions that are those at rest stretched by a
+// thousandth: flat at rest, a membrane without tension has none across it, and a step by that would be far too long.
 template <Real Scalar>
 template <class Network, class Volume>
-void CoarseCorrection<Scalar>::invert_stiffness(const Points<double>& rest, const Network& network,
+void CoarseCorrection<Scalar>::invert_stiffness(const Points<double>& stretched, const Network& network,
                                                 const Volume& volume) {
     const Eigen::Index size = 3 * points_.count();
     Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(size, size);
@@ -174,7 +181,7 @@ void CoarseCorrection<Scalar>::invert_stiffness(const Points<double>& rest, cons
         }
     };
     network.for_each_element([&](const auto& instance) {
-        const auto corners = instance.where(rest);
+        const auto corners = instance.where(stretched);
         for (std::size_t i = 0; i < corners.size(); ++i) {
             for (std::size_t j = 0; j < corners.size(); ++j)
                 add_block(instance.corners[i], instance.corners[j], instance.element.hessian_block(corners, i, j));
@@ -189,12 +196,12 @@ void CoarseCorrection<Scalar>::invert_stiffness(const Points<double>& rest, cons
     const double largest = stiffness.cwiseAbs().maxCoeff();
     if (!is_finite(largest) || !(largest > 0))
         refuse("CoarseCorrection", "the stiffness at rest must be finite, and above zero, got ", largest, " N/m");
-    Eigen::LLT<Eigen::MatrixXd> factors;
+    Eigen::LDLT<Eigen::MatrixXd> factors;
     double shift = 1e-8;
     do {
         factors.compute(stiffness + shift * largest * Eigen::MatrixXd::Identity(size, size));
         shift *= 10;
-    } while (factors.info() != Eigen::Success);
+    } while (!(factors.vectorD().minCoeff() > 0));
     const Eigen::MatrixXd inverse = factors.solve(Eigen::MatrixXd::Identity(size, size));
     compliance_.reserve(static_cast<std::size_t>(size) * residual_.size());
     for (Eigen::Index j = 0; j < size; ++j) {
@@ -206,9 +213,10 @@ void CoarseCorrection<Scalar>::invert_stiffness(const Points<double>& rest, cons
 }
 
 template <Real Scalar>
-CoarseReport<Scalar> CoarseCorrection<Scalar>::correct(PointsRef<Scalar> x, const PropagationQueue& queue) noexcept {
+CoarseReport<Scalar> CoarseCorrection<Scalar>::correct(PointsRef<Scalar> x, std::span<const Index> layer_0,
+                                                       std::span<const Index> prescribed) noexcept {
     if (x.cols() + 1 != static_cast<Eigen::Index>(x_.size())) return {};
-    begin(x, queue);
+    begin(x, layer_0, prescribed);
     find_residual();
     if (is_balanced()) {
         reset();
@@ -216,26 +224,31 @@ CoarseReport<Scalar> CoarseCorrection<Scalar>::correct(PointsRef<Scalar> x, cons
     }
     solve();
     interpolate();
-    CoarseReport<Scalar> report{.work = product(residual_, step_)};
-    const Scalar at_trial = work_at_trial();
-    if (!is_finite(report.work) || !is_finite(at_trial)) {
+    const Scalar at_first = product(residual_, step_), at_trial = work_at_trial();
+    if (!is_finite(at_first) || !is_finite(at_trial)) {
         reset();
-        return report;
+        return {};
     }
     // By the secant method where the energy would rise again. Steps from extrapolated positions may overshoot: by less
     // than a third they still converge.
-    const Scalar work = (std::max)(report.work, Scalar(0));
-    report.step_length = at_trial < -work / 3 ? work / (work - at_trial) : Scalar(1);
-    advance(x, report.step_length);
-    report.corrected = true;
-    return report;
+    const Scalar work = (std::max)(at_first, Scalar(0));
+    const Scalar length = at_trial < -work / 3 ? work / (work - at_trial) : Scalar(1);
+    advance(x, length);
+    return {true, length};
 }
 
 template <Real Scalar>
-void CoarseCorrection<Scalar>::begin(const PointsRef<Scalar>& x, const PropagationQueue& queue) noexcept {
-    for (Index v = 0; v < x.cols(); ++v) x_[at(v)].set(point(x, v));
+void CoarseCorrection<Scalar>::begin(const PointsRef<Scalar>& x, std::span<const Index> layer_0,
+                                     std::span<const Index> prescribed) noexcept {
     held_.clear();
-    for (const Index v : queue.layer(0)) held_.insert(v);
+    contact_motion_ = 0;
+    for (const Index v : layer_0) {
+        if (!held_.insert(v)) continue;
+        contact_motion_ = (std::max)(contact_motion_, norm<Scalar>(point(x, v) - x_[at(v)].point()));
+    }
+    in_contact_ = held_.items().size();
+    for (const Index v : prescribed) held_.insert(v);
+    for (Index v = 0; v < x.cols(); ++v) x_[at(v)].set(point(x, v));
 }
 
 // The forces on the points: those on the vertices that are not held, times their weights.
@@ -265,7 +278,7 @@ bool CoarseCorrection<Scalar>::is_balanced() const noexcept {
 template <Real Scalar>
 void CoarseCorrection<Scalar>::solve() noexcept {
     multiply_compliance(residual_, step_);
-    if (!held_.empty()) hold_contact();
+    if (in_contact_ > 0) hold_contact();
 }
 
 template <Real Scalar>
@@ -291,9 +304,9 @@ template <Real Scalar>
 void CoarseCorrection<Scalar>::hold_contact() noexcept {
     constexpr Scalar softness = 0.5;
     clear(weights_);  // of the points in the mean, as the extra number
-    for (const Index v : held_.items()) {
+    for (const Index v : held_.items().first(in_contact_)) {
         for (const auto& [k, weight] : points_.weights(v))
-            weights_[at(k)].number[3] += static_cast<Scalar>(weight) / static_cast<Scalar>(held_.count());
+            weights_[at(k)].number[3] += static_cast<Scalar>(weight) / static_cast<Scalar>(in_contact_);
     }
     const auto mean_of = [&](const Rows& displacements) {
         Vector3<Scalar> mean = Vector3<Scalar>::Zero();
@@ -343,11 +356,15 @@ Scalar CoarseCorrection<Scalar>::work_at_trial() noexcept {
     return sum;
 }
 
-// How far the displacement of this tick repeats the last one, 0 to 1. Without contact it would swing on.
+// How far the displacement of this tick repeats the last one, 0 to 1. No farther than the contact has moved, or it
+// would swing about a contact that stands still.
 template <Real Scalar>
 Scalar CoarseCorrection<Scalar>::repetition() const noexcept {
-    const Scalar larger = (std::max)(product(step_, step_), product(last_, last_));
-    return held_.empty() || !(larger > 0) ? Scalar(0) : (std::max)(product(step_, last_), Scalar(0)) / larger;
+    const Scalar now = product(step_, step_), larger = (std::max)(now, product(last_, last_));
+    if (!(larger > 0) || !(now > 0)) return 0;
+    Scalar farthest = 0;
+    for (const auto& displacement : step_) farthest = (std::max)(farthest, norm(displacement.point()));
+    return (std::min)(contact_motion_ / farthest, Scalar(1)) * (std::max)(product(step_, last_), Scalar(0)) / larger;
 }
 
 // The displacement of a tick is what was added in advance, and the step.
@@ -363,8 +380,9 @@ void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length)
         const Four moved = length * load(displacement_[v]);
         const Four again = Four(repeats) * (moved + load(rows_ahead_[v]));
         store(again, rows_ahead_[v]);
-        if (!held_.contains(static_cast<Index>(v)))
-            set_point(x, static_cast<Index>(v), (load(x_[v]) + moved + again).point());
+        if (held_.contains(static_cast<Index>(v))) continue;
+        store(load(x_[v]) + moved + again, x_[v]);
+        set_point(x, static_cast<Index>(v), x_[v].point());
     }
 }
 

@@ -69,7 +69,7 @@ class CoarsePoints {
     template <Real Scalar>
     void find_weights(const Points<Scalar>& rest, const Graph& graph, const std::vector<bool>& pinned);
     template <Real Scalar>
-    [[nodiscard]] std::vector<Weight> fit(const Points<Scalar>& rest, Index v, const std::vector<Near>& near) const;
+    [[nodiscard]] std::vector<Weight> fit(const Points<Scalar>& rest, Index v, const std::vector<Near>& around) const;
 
     std::vector<Index> points_;     // vertices
     std::vector<Index> number_;     // of each point among those that are not pinned, or `no_index`
@@ -166,17 +166,17 @@ inline void CoarsePoints::add_points(const Graph& graph, const std::vector<Index
 
 template <Real Scalar>
 void CoarsePoints::find_weights(const Points<Scalar>& rest, const Graph& graph, const std::vector<bool>& pinned) {
-    std::vector<std::vector<Near>> near(pinned.size());
+    std::vector<std::vector<Near>> around(pinned.size());
     std::vector<double> found(pinned.size(), std::numeric_limits<double>::infinity());
     for (std::size_t k = 0; k < points_.size(); ++k) {
         for_each_within(graph, points_[k], range * spacing_, found, [&](Index v, double at) {
-            near[static_cast<std::size_t>(v)].push_back({static_cast<Index>(k), at});
+            around[static_cast<std::size_t>(v)].push_back({static_cast<Index>(k), at});
             return true;
         });
     }
     std::vector<std::vector<Weight>> all(pinned.size());
     for (std::size_t v = 0; v < all.size(); ++v) {
-        if (!pinned[v] && !near[v].empty()) all[v] = fit(rest, static_cast<Index>(v), near[v]);
+        if (!pinned[v] && !around[v].empty()) all[v] = fit(rest, static_cast<Index>(v), around[v]);
     }
     weights_ = CompressedRows<Weight>(static_cast<Index>(all.size()), [&](auto put) {
         for (std::size_t v = 0; v < all.size(); ++v) {
@@ -189,12 +189,12 @@ void CoarsePoints::find_weights(const Points<Scalar>& rest, const Graph& graph, 
 // lie in a plane b has no component across it: the small diagonal decides. It leaves the constant exact.
 template <Real Scalar>
 std::vector<CoarsePoints::Weight> CoarsePoints::fit(const Points<Scalar>& rest, Index v,
-                                                    const std::vector<Near>& near) const {
+                                                    const std::vector<Near>& around) const {
     using Basis = Eigen::Vector4d;
     std::vector<std::pair<Basis, double>> at;
     Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
     double all = 0;
-    for (const Near& one : near) {
+    for (const Near& one : around) {
         const auto apart = point(rest, points_[static_cast<std::size_t>(one.point)]) - point(rest, v);
         const double radius = (std::max)(range * spacing_, (std::numeric_limits<double>::min)());
         const double s = (std::min)(one.distance / radius, 1.0);
@@ -208,8 +208,8 @@ std::vector<CoarsePoints::Weight> CoarsePoints::fit(const Points<Scalar>& rest, 
     sum.diagonal().tail<3>().array() += 1e-6 * all;
     const Basis value = sum.ldlt().solve(Basis::Unit(0));
     std::vector<Weight> weights;
-    for (std::size_t i = 0; i < near.size(); ++i) {
-        const Index number = number_[static_cast<std::size_t>(near[i].point)];
+    for (std::size_t i = 0; i < around.size(); ++i) {
+        const Index number = number_[static_cast<std::size_t>(around[i].point)];
         const double weight = at[i].second * at[i].first.dot(value);
         if (number != no_index && weight != 0) weights.push_back({number, static_cast<float>(weight)});
     }

@@ -128,9 +128,14 @@ class QuasiStaticSolver {
     }
     void contact_points(std::size_t) && = delete;
 
-    /// The propagation queue of the last step.
+    ///@{
+    /// The propagation queue of the last step; the vertices whose positions constraints prescribed in the last one that
+    /// advanced.
     [[nodiscard]] const PropagationQueue& queue() const& noexcept { return active_.queue(); }
     void queue() && = delete;
+    [[nodiscard]] std::span<const Index> prescribed() const& noexcept { return last_prescribed_.items(); }
+    void prescribed() && = delete;
+    ///@}
 
   private:
     // Whether the volume springs are on a body that may move, see `on`.
