@@ -172,12 +172,12 @@ template <Real Scalar>
 template <class Network, class Volume>
 void CoarseCorrection<Scalar>::invert_stiffness(const Points<double>& stretched, const Network& network,
                                                 const Volume& volume) {
-    const Eigen::Index size = 3 * points_.count();
+    const Eigen::Index three = 3, size = three * points_.count();
     Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(size, size);
     const auto add_block = [&](Index first, Index second, const Eigen::Matrix3d& block) {
         for (const auto& [i, a] : points_.weights(first)) {
             for (const auto& [j, b] : points_.weights(second))
-                stiffness.block<3, 3>(3 * i, 3 * j) += static_cast<double>(a) * static_cast<double>(b) * block;
+                stiffness.block<3, 3>(three * i, three * j) += static_cast<double>(a) * static_cast<double>(b) * block;
         }
     };
     network.for_each_element([&](const auto& instance) {
