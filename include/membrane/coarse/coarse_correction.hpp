@@ -88,7 +88,7 @@ class CoarseCorrection {
     /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        visit(self.x_, self.last_, self.ahead_, self.rows_ahead_);
+        visit(self.x_, self.last_, self.repeats_, self.rows_ahead_);
     }
 
   private:
@@ -119,15 +119,17 @@ class CoarseCorrection {
     [[nodiscard]] Scalar repetition() const noexcept;
     void advance(PointsRef<Scalar>& x, Scalar step_length) noexcept;
 
-    void multiply_compliance(const Rows& forces, Rows& displacements) const noexcept;
+    void add_response(std::size_t k, std::size_t i, Scalar force, Rows& displacements) noexcept;
 
     CoarsePoints points_;
     std::vector<std::unique_ptr<ElementForces<Scalar>>> kinds_;
     Rows compliance_;                         // of the points, by columns [m/N]
     std::vector<Scalar> tolerance_;           // of the force on each point [N]
     Rows x_, trial_, displacement_, forces_;  // of vertices
-    Rows residual_, step_, weights_;          // of points
-    Rows last_, ahead_, rows_ahead_;          // of points, of points, of vertices
+    Rows residual_, step_, last_;             // of points: forces, displacements of this tick and the last one
+    Rows rows_ahead_;                         // of vertices: displaced in advance
+    Scalar repeats_ = 0;                      // the part of `last_` that was
+    std::vector<Scalar> weights_;             // of points in the mean of layer 0
     std::array<Rows, 3> response_;            // of the points to a force on the held vertices
     IndexSet held_;                           // layer 0, then those prescribed
     std::size_t in_contact_ = 0;              // number of the first
@@ -155,9 +157,10 @@ CoarseCorrection<Scalar>::CoarseCorrection(const TriangleMesh<Scalar>& mesh, con
         refuse("CoarseCorrection", "the foundation must be of the mesh's ", count, " vertices");
     kinds_ = element_forces(network, foundation);
     for (Rows* rows : {&x_, &trial_, &displacement_, &forces_, &rows_ahead_}) rows->resize(at(count) + 1);
-    for (Rows* rows : {&residual_, &step_, &weights_, &last_, &ahead_}) rows->resize(at(points_.count()));
+    for (Rows* rows : {&residual_, &step_, &last_}) rows->resize(at(points_.count()));
     for (Rows& rows : response_) rows.resize(at(points_.count()));
-    tolerance_.assign(at(points_.count()), 0);
+    weights_.assign(at(points_.count()), 0);
+    tolerance_ = weights_;
     for (Index v = 0; v < count; ++v) {
         x_[at(v)].set(point(mesh.positions(), v));
         for (const auto& [k, weight] : points_.weights(v))
@@ -194,7 +197,7 @@ void CoarseCorrection<Scalar>::invert_stiffness(const Points<double>& stretched,
     }
     if (size == 0) return;
     const double largest = stiffness.cwiseAbs().maxCoeff();
-    if (!is_finite(largest) || !(largest > 0))
+    if (!is_finite(stiffness) || !(largest > 0))  // the largest may hide a NaN
         refuse("CoarseCorrection", "the stiffness at rest must be finite, and above zero, got ", largest, " N/m");
     Eigen::LDLT<Eigen::MatrixXd> factors;
     double shift = 1e-8;
@@ -275,26 +278,23 @@ bool CoarseCorrection<Scalar>::is_balanced() const noexcept {
     return true;
 }
 
+// The displacements by the forces on the points.
 template <Real Scalar>
 void CoarseCorrection<Scalar>::solve() noexcept {
-    multiply_compliance(residual_, step_);
+    clear(step_);
+    for (std::size_t k = 0; k < residual_.size(); ++k) {
+        for (std::size_t i = 0; i < 3; ++i) add_response(k, i, residual_[k].number[i], step_);
+    }
     if (in_contact_ > 0) hold_contact();
 }
 
+// Adds the displacements by a force on point `k` along axis `i`.
 template <Real Scalar>
-void CoarseCorrection<Scalar>::multiply_compliance(const Rows& forces, Rows& displacements) const noexcept {
-    clear(displacements);
-    auto column = compliance_.begin();
-    for (const auto& force : forces) {
-        for (std::size_t i = 0; i < 3; ++i) {
-            if (force.number[i] == 0) {
-                column += static_cast<std::ptrdiff_t>(displacements.size());
-                continue;
-            }
-            const Four by(force.number[i]);
-            for (auto& row : displacements) store(load(row) + by * load(*column++), row);
-        }
-    }
+void CoarseCorrection<Scalar>::add_response(std::size_t k, std::size_t i, Scalar force, Rows& displacements) noexcept {
+    if (force == 0) return;
+    auto column = compliance_.begin() + static_cast<std::ptrdiff_t>((3 * k + i) * displacements.size());
+    const Four by(force);
+    for (auto& row : displacements) store(load(row) + by * load(*column++), row);
 }
 
 // The tool holds layer 0. So the mean displacement of its vertices is reduced to a third, as by a spring twice as stiff
@@ -303,25 +303,21 @@ void CoarseCorrection<Scalar>::multiply_compliance(const Rows& forces, Rows& dis
 template <Real Scalar>
 void CoarseCorrection<Scalar>::hold_contact() noexcept {
     constexpr Scalar softness = 0.5;
-    clear(weights_);  // of the points in the mean, as the extra number
+    std::fill(weights_.begin(), weights_.end(), Scalar(0));
     for (const Index v : held_.items().first(in_contact_)) {
         for (const auto& [k, weight] : points_.weights(v))
-            weights_[at(k)].number[3] += static_cast<Scalar>(weight) / static_cast<Scalar>(in_contact_);
+            weights_[at(k)] += static_cast<Scalar>(weight) / static_cast<Scalar>(in_contact_);
     }
     const auto mean_of = [&](const Rows& displacements) {
         Vector3<Scalar> mean = Vector3<Scalar>::Zero();
-        for (std::size_t k = 0; k < weights_.size(); ++k) mean += weights_[k].extra() * displacements[k].point();
+        for (std::size_t k = 0; k < weights_.size(); ++k) mean += weights_[k] * displacements[k].point();
         return mean;
     };
     std::array<Vector3<Scalar>, 3> columns;
-    for (Eigen::Index i = 0; i < 3; ++i) {
-        Rows& one = response_[static_cast<std::size_t>(i)];
-        for (auto& weight : weights_) {
-            const Scalar part = weight.extra();
-            weight.set(part * Vector3<Scalar>::Unit(i), part);
-        }
-        multiply_compliance(weights_, one);
-        columns[static_cast<std::size_t>(i)] = mean_of(one);
+    for (std::size_t i = 0; i < 3; ++i) {
+        clear(response_[i]);
+        for (std::size_t k = 0; k < weights_.size(); ++k) add_response(k, i, weights_[k], response_[i]);
+        columns[i] = mean_of(response_[i]);
     }
     const auto& [x, y, z] = columns;
     const Symmetric3<Scalar> compliance{x.x(), y.y(), z.z(), x.y(), x.z(), y.z()};
@@ -370,15 +366,14 @@ Scalar CoarseCorrection<Scalar>::repetition() const noexcept {
 // The displacement of a tick is what was added in advance, and the step.
 template <Real Scalar>
 void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length) noexcept {
-    const Four length(step_length);
-    for (std::size_t k = 0; k < step_.size(); ++k) store(length * load(step_[k]) + load(ahead_[k]), step_[k]);
-    const Scalar repeats = repetition();
-    for (std::size_t k = 0; k < step_.size(); ++k) store(Four(repeats) * load(step_[k]), ahead_[k]);
+    const Four length(step_length), before(repeats_);
+    for (std::size_t k = 0; k < step_.size(); ++k) store(length * load(step_[k]) + before * load(last_[k]), step_[k]);
+    repeats_ = repetition();
     std::swap(last_, step_);
     for (std::size_t v = 0; v + 1 < x_.size(); ++v) {
         if (points_.weights(static_cast<Index>(v)).empty()) continue;
         const Four moved = length * load(displacement_[v]);
-        const Four again = Four(repeats) * (moved + load(rows_ahead_[v]));
+        const Four again = Four(repeats_) * (moved + load(rows_ahead_[v]));
         store(again, rows_ahead_[v]);
         if (held_.contains(static_cast<Index>(v))) continue;
         store(load(x_[v]) + moved + again, x_[v]);
@@ -388,7 +383,9 @@ void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length)
 
 template <Real Scalar>
 void CoarseCorrection<Scalar>::reset() noexcept {
-    for (Rows* rows : {&last_, &ahead_, &rows_ahead_}) clear(*rows);
+    clear(last_);
+    clear(rows_ahead_);
+    repeats_ = 0;
 }
 
 }  // namespace membrane

@@ -65,15 +65,14 @@ class CoarsePoints {
     static void for_each_within(const Graph& graph, Index from, double distance, std::vector<double>& found,
                                 const Visit& visit);
     void add_points(const Graph& graph, const std::vector<Index>& candidates, double spacing, Index count,
-                    const std::vector<bool>& pinned);
+                    const std::vector<bool>& pinned, std::vector<double>& distances);
     template <Real Scalar>
     void find_weights(const Points<Scalar>& rest, const Graph& graph, const std::vector<bool>& pinned);
     template <Real Scalar>
     [[nodiscard]] std::vector<Weight> fit(const Points<Scalar>& rest, Index v, const std::vector<Near>& around) const;
 
-    std::vector<Index> points_;     // vertices
-    std::vector<Index> number_;     // of each point among those that are not pinned, or `no_index`
-    std::vector<double> distance_;  // of each vertex to the nearest point [m]
+    std::vector<Index> points_;  // vertices
+    std::vector<Index> number_;  // of each point among those that are not pinned, or `no_index`
     CompressedRows<Weight> weights_;
     Index count_ = 0;
     double spacing_ = 0;
@@ -102,17 +101,14 @@ CoarsePoints::CoarsePoints(const TriangleMesh<Scalar>& mesh, const Network& netw
         if (!graph[v].empty() && network.pinned(v)) pins.push_back(v);
     }
     // How far apart that many points are, then as far apart again, pinned ones first.
-    for (const bool first : {true, false}) {
-        points_.clear();
-        distance_.assign(pinned.size(), std::numeric_limits<double>::infinity());
-        if (first) {
-            add_points(graph, joined, 0, count, pinned);
-            for (const Index v : joined) spacing_ = (std::max)(spacing_, distance_[static_cast<std::size_t>(v)]);
-        } else {
-            add_points(graph, pins, spacing_, unlimited, pinned);
-            add_points(graph, joined, spacing_, unlimited, pinned);
-        }
-    }
+    const std::vector<double> far_off(pinned.size(), std::numeric_limits<double>::infinity());
+    std::vector<double> distances = far_off;
+    add_points(graph, joined, 0, count, pinned, distances);
+    for (const Index v : joined) spacing_ = (std::max)(spacing_, distances[static_cast<std::size_t>(v)]);
+    points_.clear();
+    distances = far_off;
+    add_points(graph, pins, spacing_, unlimited, pinned, distances);
+    add_points(graph, joined, spacing_, unlimited, pinned, distances);
     for (const Index v : points_) number_.push_back(network.pinned(v) ? no_index : count_++);
     find_weights(rest, graph, pinned);
 }
@@ -143,22 +139,22 @@ void CoarsePoints::for_each_within(const Graph& graph, Index from, double distan
 }
 
 // Adds the candidate that is farthest from all points, again and again, until all are within `spacing`, or there are
-// `count` points that are not pinned.
+// `count` points that are not pinned. `distances` are those from each vertex to the nearest point.
 inline void CoarsePoints::add_points(const Graph& graph, const std::vector<Index>& candidates, double spacing,
-                                     Index count, const std::vector<bool>& pinned) {
-    std::vector<double> found(distance_.size(), std::numeric_limits<double>::infinity());
+                                     Index count, const std::vector<bool>& pinned, std::vector<double>& distances) {
+    std::vector<double> found(distances.size(), std::numeric_limits<double>::infinity());
     const auto is_nearer = [&](Index a, Index b) {
-        return distance_[static_cast<std::size_t>(a)] < distance_[static_cast<std::size_t>(b)];
+        return distances[static_cast<std::size_t>(a)] < distances[static_cast<std::size_t>(b)];
     };
     while (count > 0 && !candidates.empty()) {
         const Index next = *std::max_element(candidates.begin(), candidates.end(), is_nearer);
-        if (!(distance_[static_cast<std::size_t>(next)] > spacing)) return;
+        if (!(distances[static_cast<std::size_t>(next)] > spacing)) return;
         points_.push_back(next);
         count -= pinned[static_cast<std::size_t>(next)] ? 0 : 1;
         for_each_within(graph, next, std::numeric_limits<double>::infinity(), found, [&](Index v, double at) {
             const auto i = static_cast<std::size_t>(v);
-            if (!(at < distance_[i])) return false;
-            distance_[i] = at;
+            if (!(at < distances[i])) return false;
+            distances[i] = at;
             return true;
         });
     }

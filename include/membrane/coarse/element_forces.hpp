@@ -13,6 +13,7 @@
 #include <membrane/core/lane_points.hpp>
 #include <membrane/model/mass_spring_network.hpp>
 #include <membrane/model/volume_springs.hpp>
+#include <membrane/solve/packed_elements.hpp>
 #include <membrane/tissue/elements.hpp>
 
 /// The forces of a whole membrane, several elements at a time.
@@ -241,7 +242,7 @@ template <class Network, class Volume, Real Scalar = typename Network::Scalar>
         using Law = std::remove_cvref_t<decltype(springs.law())>;
         add(detail::SpringKind<Scalar, Law>{springs.law()}, [&](const auto& put) { springs.for_each_element(put); });
     };
-    if constexpr (requires { network.for_each_kind([](const auto&) {}); }) {
+    if constexpr (HasElements<Network>) {
         add_springs(network.springs());
         network.for_each_kind([&]<class E>(const Elements<Scalar, E>& elements) {
             add(detail::ElementKind<Scalar, E>(), [&](const auto& put) { elements.for_each_element(put); });
