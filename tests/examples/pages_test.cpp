@@ -846,7 +846,13 @@ TEST_CASE("pages: coarse") {
     (void)coarse.correct(x, solver);  // all vertices may have moved
     tree.refit(x);
     // [/coarse]
+    // [reaction_error]
+    const auto error = coarse.reaction_error(x, solver);  // after the step [N]
+    const bool trusted = norm(error) < 0.01 * norm(report.total_reaction());
+    // [/reaction_error]
     CHECK(report.reactions[0].z() > 0);
+    CHECK(norm(error) > 0);
+    CHECK_FALSE(trusted);  // a ball that appears inside
     CHECK(coarse.points().count() > 60);
 }
 

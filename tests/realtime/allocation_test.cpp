@@ -143,6 +143,7 @@ TEST_CASE("nor does a coarse correction", "[allocation]") {
         for (int i = 0; i < 100; ++i) {
             const auto target = Vector3<double>(0, 0, -1e-5 * i);
             (void)solver.step(x, 1e-3, network, foundation, pull(Index(0), target));
+            (void)coarse.reaction_error(x, solver);
             (void)coarse.correct(x, solver);
         }
         coarse.reset();

@@ -17,6 +17,7 @@
 #include <membrane/coarse/element_forces.hpp>
 #include <membrane/core/check.hpp>
 #include <membrane/core/index_set.hpp>
+#include <membrane/core/rigid_frame.hpp>
 #include <membrane/core/symmetric3.hpp>
 #include <membrane/surface/vertex_split.hpp>
 
@@ -43,6 +44,8 @@ template <Real Scalar>
 struct CoarseReport {
     bool corrected = false;  ///< whether it displaced the membrane; false at equilibrium, or if a number was not finite
     Scalar step_length = 0;  ///< by which the line search multiplied the displacement, 0 to 1
+    /// An estimate of the error of the step: the sum of its reactions, less that at equilibrium [N].
+    Vector3<Scalar> reaction_error = Vector3<Scalar>::Zero();
 };
 
 /// After a step, moves all vertices but those of layer 0, pinned and prescribed ones by the displacements of a few
@@ -55,11 +58,12 @@ struct CoarseReport {
 /// keeps its shape between the points: `wake_all` brings it to rest once the tool has left. The method and its error:
 /// README.md in this folder.
 ///
-/// One thread at a time for each instance. The membrane must not tear, its anchors must not move.
+/// One thread at a time for each instance. The membrane must not tear. Its foundation may move as a rigid body.
 template <Real Scalar>
 class CoarseCorrection {
   public:
-    /// Copies network and foundation, but for a foundation that does not take `Lanes`, which must outlive it.
+    /// Copies network and foundation, but for a foundation that does not take `Lanes`, which must outlive it. On a
+    /// moving body the foundation is that of the body at rest.
     /// @throws InvalidInput for a network or foundation of other vertices than the mesh's, an option out of its range,
     /// or a stiffness at rest that is not finite, or zero. Cost: O(V log V) for each point, the cube of their number.
     template <ElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume>
@@ -67,16 +71,23 @@ class CoarseCorrection {
                      const CoarseOptions& options = {});
 
     ///@{
-    /// Corrects `x` (3 x V [m]) after a step of `solver`; or with layer 0 of its queue, and the prescribed vertices. If
-    /// `x` does not have V vertices, nothing moves. Online. Cost: two evaluations of all elements, some 30 products for
-    /// each vertex, nine for each pair of points.
+    /// Corrects `x` (3 x V [m]) after a step of `solver`; or with layer 0 of its queue, and the prescribed vertices.
+    /// `pose` is that of the body: `body.pose()` of a `MovingBody`. If `x` does not have V vertices, nothing moves.
+    /// Online. Cost: two evaluations of all elements, some 30 products for each vertex, nine for each pair of points.
     template <class Solver>
-    CoarseReport<Scalar> correct(PointsRef<Scalar> x, const Solver& solver) noexcept {
-        return correct(x, solver.queue().layer(0), solver.prescribed());
+    CoarseReport<Scalar> correct(PointsRef<Scalar> x, const Solver& solver,
+                                 const RigidFrame<Scalar>& pose = {}) noexcept {
+        return correct(x, solver.queue().layer(0), solver.prescribed(), pose);
     }
-    CoarseReport<Scalar> correct(PointsRef<Scalar> x, std::span<const Index> layer_0,
-                                 std::span<const Index> prescribed) noexcept;
+    CoarseReport<Scalar> correct(PointsRef<Scalar> x, std::span<const Index> layer_0, std::span<const Index> prescribed,
+                                 const RigidFrame<Scalar>& pose = {}) noexcept;
     ///@}
+
+    /// The `reaction_error` that a correction would report [N]; nothing moves. For a loop that does without: how far
+    /// can its forces be trusted? 0 if `x` does not have V vertices. Online. Cost: less than half that of a correction.
+    template <class Solver>
+    [[nodiscard]] Vector3<Scalar> reaction_error(const ConstPointsRef<Scalar>& x, const Solver& solver,
+                                                 const RigidFrame<Scalar>& pose = {}) noexcept;
 
     /// The coarse points.
     [[nodiscard]] const CoarsePoints& points() const& noexcept { return points_; }
@@ -109,31 +120,34 @@ class CoarseCorrection {
     void invert_stiffness(const Points<double>& stretched, const Network& network, const Volume& volume);
 
     // In the order of a correction.
-    void begin(const PointsRef<Scalar>& x, std::span<const Index> layer_0, std::span<const Index> prescribed) noexcept;
-    void find_residual() noexcept;
+    void hold(std::span<const Index> layer_0, std::span<const Index> prescribed) noexcept;
+    static void load_all(const ConstPointsRef<Scalar>& x, const RigidFrame<Scalar>& pose, Rows& rows) noexcept;
+    [[nodiscard]] Scalar contact_motion(const Rows& before, const Rows& now) const noexcept;
+    void find_residual(const Rows& x) noexcept;
     [[nodiscard]] bool is_balanced() const noexcept;
     void solve() noexcept;
     void hold_contact() noexcept;
     void interpolate() noexcept;
     [[nodiscard]] Scalar work_at_trial() noexcept;
     [[nodiscard]] Scalar repetition() const noexcept;
-    void advance(PointsRef<Scalar>& x, Scalar step_length) noexcept;
+    void advance(PointsRef<Scalar>& x, Scalar step_length, const RigidFrame<Scalar>& pose) noexcept;
 
     void add_response(std::size_t k, std::size_t i, Scalar force, Rows& displacements) noexcept;
 
     CoarsePoints points_;
     std::vector<std::unique_ptr<ElementForces<Scalar>>> kinds_;
-    Rows compliance_;                         // of the points, by columns [m/N]
-    std::vector<Scalar> tolerance_;           // of the force on each point [N]
-    Rows x_, trial_, displacement_, forces_;  // of vertices
-    Rows residual_, step_, last_;             // of points: forces, displacements of this tick and the last one
-    Rows rows_ahead_;                         // of vertices: displaced in advance
-    Scalar repeats_ = 0;                      // the part of `last_` that was
-    std::vector<Scalar> weights_;             // of points in the mean of layer 0
-    std::array<Rows, 3> response_;            // of the points to a force on the held vertices
-    IndexSet held_;                           // layer 0, then those prescribed
-    std::size_t in_contact_ = 0;              // number of the first
-    Scalar contact_motion_ = 0;               // largest displacement of one of them since the last correction [m]
+    Rows compliance_;                          // of the points, by columns [m/N]
+    std::vector<Scalar> tolerance_;            // of the force on each point [N]
+    Rows x_, trial_, displacement_, forces_;   // of vertices, in the frame of the body
+    Rows residual_, step_, last_;              // of points: forces, displacements of this tick and the last one
+    Rows rows_ahead_;                          // of vertices: displaced in advance
+    Scalar repeats_ = 0;                       // the part of `last_` that was
+    std::vector<Scalar> weights_;              // of points in the mean of layer 0
+    std::array<Rows, 3> response_;             // of the points to a force on the held vertices
+    IndexSet held_;                            // layer 0, then those prescribed
+    std::size_t in_contact_ = 0;               // number of the first
+    Scalar contact_motion_ = 0;                // largest displacement of one of them since the last correction [m]
+    Vector3<Scalar> reaction_error_{0, 0, 0};  // in the frame of the body [N]
 };
 
 template <class Network, class Volume>
@@ -151,7 +165,7 @@ CoarseCorrection<Scalar>::CoarseCorrection(const TriangleMesh<Scalar>& mesh, con
     : points_((options.validate(), mesh), network, options.points), held_(mesh.vertex_count()) {
     static_assert(!FollowsSplit<Network>, "CoarseCorrection: the membrane must not tear");
     constexpr bool moves = requires { foundation.body(); };
-    static_assert(!moves, "CoarseCorrection: the anchors must not move");
+    static_assert(!moves, "CoarseCorrection: pass the foundation of the body at rest, and its pose to `correct`");
     const Index count = mesh.vertex_count();
     if (!has_vertices(foundation, count))
         refuse("CoarseCorrection", "the foundation must be of the mesh's ", count, " vertices");
@@ -217,10 +231,14 @@ void CoarseCorrection<Scalar>::invert_stiffness(const Points<double>& stretched,
 
 template <Real Scalar>
 CoarseReport<Scalar> CoarseCorrection<Scalar>::correct(PointsRef<Scalar> x, std::span<const Index> layer_0,
-                                                       std::span<const Index> prescribed) noexcept {
+                                                       std::span<const Index> prescribed,
+                                                       const RigidFrame<Scalar>& pose) noexcept {
     if (x.cols() + 1 != static_cast<Eigen::Index>(x_.size())) return {};
-    begin(x, layer_0, prescribed);
-    find_residual();
+    hold(layer_0, prescribed);
+    load_all(x, pose, trial_);
+    contact_motion_ = contact_motion(x_, trial_);
+    std::swap(x_, trial_);
+    find_residual(x_);
     if (is_balanced()) {
         reset();
         return {};
@@ -236,31 +254,52 @@ CoarseReport<Scalar> CoarseCorrection<Scalar>::correct(PointsRef<Scalar> x, std:
     // than a third they still converge.
     const Scalar work = (std::max)(at_first, Scalar(0));
     const Scalar length = at_trial < -work / 3 ? work / (work - at_trial) : Scalar(1);
-    advance(x, length);
-    return {true, length};
+    advance(x, length, pose);
+    return {true, length, pose.vector_to_world(reaction_error_)};
 }
 
 template <Real Scalar>
-void CoarseCorrection<Scalar>::begin(const PointsRef<Scalar>& x, std::span<const Index> layer_0,
-                                     std::span<const Index> prescribed) noexcept {
+template <class Solver>
+Vector3<Scalar> CoarseCorrection<Scalar>::reaction_error(const ConstPointsRef<Scalar>& x, const Solver& solver,
+                                                         const RigidFrame<Scalar>& pose) noexcept {
+    if (x.cols() + 1 != static_cast<Eigen::Index>(x_.size())) return Vector3<Scalar>::Zero();
+    hold(solver.queue().layer(0), solver.prescribed());
+    load_all(x, pose, trial_);
+    find_residual(trial_);
+    solve();
+    return pose.vector_to_world(reaction_error_);
+}
+
+template <Real Scalar>
+void CoarseCorrection<Scalar>::hold(std::span<const Index> layer_0, std::span<const Index> prescribed) noexcept {
     held_.clear();
-    contact_motion_ = 0;
-    for (const Index v : layer_0) {
-        if (!held_.insert(v)) continue;
-        contact_motion_ = (std::max)(contact_motion_, norm<Scalar>(point(x, v) - x_[at(v)].point()));
-    }
+    for (const Index v : layer_0) held_.insert(v);
     in_contact_ = held_.items().size();
     for (const Index v : prescribed) held_.insert(v);
-    for (Index v = 0; v < x.cols(); ++v) x_[at(v)].set(point(x, v));
+}
+
+// The positions of all vertices in the frame of the body.
+template <Real Scalar>
+void CoarseCorrection<Scalar>::load_all(const ConstPointsRef<Scalar>& x, const RigidFrame<Scalar>& pose,
+                                        Rows& rows) noexcept {
+    for (Index v = 0; v < x.cols(); ++v) rows[at(v)].set(pose.point_to_body(point(x, v)));
+}
+
+template <Real Scalar>
+Scalar CoarseCorrection<Scalar>::contact_motion(const Rows& before, const Rows& now) const noexcept {
+    Scalar largest = 0;
+    for (const Index v : held_.items().first(in_contact_))
+        largest = (std::max)(largest, norm<Scalar>(now[at(v)].point() - before[at(v)].point()));
+    return largest;
 }
 
 // The forces on the points: those on the vertices that are not held, times their weights.
 template <Real Scalar>
-void CoarseCorrection<Scalar>::find_residual() noexcept {
+void CoarseCorrection<Scalar>::find_residual(const Rows& x) noexcept {
     clear(forces_);
-    for (const auto& kind : kinds_) kind->add_forces(x_, forces_);
+    for (const auto& kind : kinds_) kind->add_forces(x, forces_);
     clear(residual_);
-    for (std::size_t v = 0; v + 1 < x_.size(); ++v) {
+    for (std::size_t v = 0; v + 1 < x.size(); ++v) {
         if (held_.contains(static_cast<Index>(v))) continue;
         const Four force = load(forces_[v]);
         for (const auto& [k, weight] : points_.weights(static_cast<Index>(v))) {
@@ -285,6 +324,7 @@ void CoarseCorrection<Scalar>::solve() noexcept {
     for (std::size_t k = 0; k < residual_.size(); ++k) {
         for (std::size_t i = 0; i < 3; ++i) add_response(k, i, residual_[k].number[i], step_);
     }
+    reaction_error_.setZero();
     if (in_contact_ > 0) hold_contact();
 }
 
@@ -299,7 +339,8 @@ void CoarseCorrection<Scalar>::add_response(std::size_t k, std::size_t i, Scalar
 
 // The tool holds layer 0. So the mean displacement of its vertices is reduced to a third, as by a spring twice as stiff
 // as the membrane is there. Without it the points would push a fine membrane off the tool; held wholly it would not
-// follow forceps.
+// follow forceps. The force that would hold it wholly is what the reaction is off: it is how that would change, were
+// the others in equilibrium.
 template <Real Scalar>
 void CoarseCorrection<Scalar>::hold_contact() noexcept {
     constexpr Scalar softness = 0.5;
@@ -321,8 +362,9 @@ void CoarseCorrection<Scalar>::hold_contact() noexcept {
     }
     const auto& [x, y, z] = columns;
     const Symmetric3<Scalar> compliance{x.x(), y.y(), z.z(), x.y(), x.z(), y.z()};
-    const Vector3<Scalar> force = inverse(compliance, 1 / (1 + softness)) * mean_of(step_);
-    if (!is_finite(force)) return;
+    const Vector3<Scalar> whole = inverse(compliance) * mean_of(step_), force = whole / (1 + softness);
+    if (!is_finite(whole)) return;
+    reaction_error_ = -whole;
     for (std::size_t k = 0; k < step_.size(); ++k) {
         Four sum = load(step_[k]);
         for (std::size_t i = 0; i < 3; ++i) sum = sum - Four(force[i]) * load(response_[i][k]);
@@ -365,7 +407,8 @@ Scalar CoarseCorrection<Scalar>::repetition() const noexcept {
 
 // The displacement of a tick is what was added in advance, and the step.
 template <Real Scalar>
-void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length) noexcept {
+void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length,
+                                       const RigidFrame<Scalar>& pose) noexcept {
     const Four length(step_length), before(repeats_);
     for (std::size_t k = 0; k < step_.size(); ++k) store(length * load(step_[k]) + before * load(last_[k]), step_[k]);
     repeats_ = repetition();
@@ -376,8 +419,10 @@ void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length)
         const Four again = Four(repeats_) * (moved + load(rows_ahead_[v]));
         store(again, rows_ahead_[v]);
         if (held_.contains(static_cast<Index>(v))) continue;
-        store(load(x_[v]) + moved + again, x_[v]);
-        set_point(x, static_cast<Index>(v), x_[v].point());
+        store(moved + again, displacement_[v]);
+        store(load(x_[v]) + load(displacement_[v]), x_[v]);
+        const Index here = static_cast<Index>(v);
+        set_point(x, here, Vector3<Scalar>(point(x, here) + pose.vector_to_world(displacement_[v].point())));
     }
 }
 
