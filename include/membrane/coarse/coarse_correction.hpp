@@ -421,7 +421,7 @@ void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length,
         if (held_.contains(static_cast<Index>(v))) continue;
         store(moved + again, displacement_[v]);
         store(load(x_[v]) + load(displacement_[v]), x_[v]);
-        const Index here = static_cast<Index>(v);
+        const auto here = static_cast<Index>(v);
         set_point(x, here, Vector3<Scalar>(point(x, here) + pose.vector_to_world(displacement_[v].point())));
     }
 }
