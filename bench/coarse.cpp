@@ -25,7 +25,8 @@
 
 // coarse FOLDER: where nothing but the rim holds a membrane, or next to nothing, how far the force of a step is off the
 // equilibrium, how far by the estimate, and how long a tick takes: with the default layers, with all, and with the
-// default ones and a coarse correction. Prints a Markdown table and writes it to coarse.csv in FOLDER.
+// default ones and a coarse correction, which may wake vertices. Prints a Markdown table and writes it to coarse.csv in
+// FOLDER.
 
 namespace {
 
@@ -43,11 +44,12 @@ constexpr int rounds = 3;
 struct Setting {
     const char* name;
     membrane::SolverOptions<double> solver;
-    bool corrected;
+    bool corrected, wakes;
 };
-const Setting settings[]{{"6 layers", {.layers = 6, .sweeps = 2}, false},
-                         {"all layers", {.layers = membrane::unlimited, .sweeps = 2}, false},
-                         {"6 layers and correction", {.layers = 6, .sweeps = 2}, true}};
+const Setting settings[]{{"6 layers", {.layers = 6, .sweeps = 2}, false, false},
+                         {"all layers", {.layers = membrane::unlimited, .sweeps = 2}, false, false},
+                         {"6 layers and correction", {.layers = 6, .sweeps = 2}, true, false},
+                         {"the same, unbalanced woken", {.layers = 6, .sweeps = 2}, true, true}};
 
 /// What a hand does.
 struct Path {
@@ -173,7 +175,9 @@ Result run(const Path& path, const M& membrane, const Setting& setting, const st
         });
         Vector estimate = Vector::Zero();
         if (setting.corrected) {
-            estimate = coarse.correct(x, solver).reaction_error;
+            const auto corrected = coarse.correct(x, solver);
+            estimate = corrected.reaction_error;
+            if (setting.wakes) solver.wake(corrected.unbalanced);
             tree.refit(x);
         } else {
             tree.refit(x, report.moved);

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <span>
@@ -39,13 +41,28 @@ struct CoarseOptions {
     void validate() const;
 };
 
+namespace detail {
+
+// A solver after a step: its queue, and the vertices that constraints prescribed.
+template <class Solver>
+concept HasQueue = requires(const Solver& solver) {
+    { solver.queue().layer(0) } -> std::convertible_to<std::span<const Index>>;
+    { solver.prescribed() } -> std::convertible_to<std::span<const Index>>;
+};
+
+}  // namespace detail
+
 /// What a correction did.
 template <Real Scalar>
 struct CoarseReport {
     bool corrected = false;  ///< whether it displaced the membrane; false at equilibrium, or if a number was not finite
     Scalar step_length = 0;  ///< by which the line search multiplied the displacement, 0 to 1
-    /// An estimate of the error of the step: the sum of its reactions, less that at equilibrium [N].
+    /// An estimate of the error of the step: the sum of its reactions to tools and forceps, less that of the same step
+    /// solved to the end [N]. 0 without a constraint, NaN if there is no estimate. Only its size counts.
     Vector3<Scalar> reaction_error = Vector3<Scalar>::Zero();
+    /// Vertices beyond the queue with a larger residual force than any in it, the largest 16: what is finer than the
+    /// points. For `solver.wake`. Valid until the next correction.
+    std::span<const Index> unbalanced = {};
 };
 
 /// After a step, moves all vertices but those of layer 0, pinned and prescribed ones by the displacements of a few
@@ -55,8 +72,8 @@ struct CoarseReport {
 ///
 /// While the contact moves, the displacement of a tick is repeated in advance, as far as it repeats the one before:
 /// beyond layer 0 positions are a tick ahead of the tool. The solver need not be woken for these motions. What sleeps
-/// keeps its shape between the points: `wake_all` brings it to rest once the tool has left. The method and its error:
-/// README.md in this folder.
+/// keeps its shape between the points, unless `CoarseReport::unbalanced` is woken. The method and its error: README.md
+/// in this folder.
 ///
 /// One thread at a time for each instance. The membrane must not tear. Its foundation may move as a rigid body.
 template <Real Scalar>
@@ -72,22 +89,32 @@ class CoarseCorrection {
 
     ///@{
     /// Corrects `x` (3 x V [m]) after a step of `solver`; or with layer 0 of its queue, and the prescribed vertices.
-    /// `pose` is that of the body: `body.pose()` of a `MovingBody`. If `x` does not have V vertices, nothing moves.
-    /// Online. Cost: two evaluations of all elements, some 30 products for each vertex, nine for each pair of points.
-    template <class Solver>
+    /// `pose` is that of the body, `body.pose()` of a `MovingBody`: network and foundation turn with it, a `DeadLoad`
+    /// as well. If `x` does not have V vertices, nothing moves. Online. Cost: two evaluations of all elements, some 30
+    /// products for each vertex, nine for each pair of points.
+    template <detail::HasQueue Solver>
     CoarseReport<Scalar> correct(PointsRef<Scalar> x, const Solver& solver,
                                  const RigidFrame<Scalar>& pose = {}) noexcept {
-        return correct(x, solver.queue().layer(0), solver.prescribed(), pose);
+        auto report = correct(x, solver.queue().layer(0), solver.prescribed(), pose);
+        if (has_all(x)) report.unbalanced = find_unbalanced(solver.queue());
+        return report;
     }
     CoarseReport<Scalar> correct(PointsRef<Scalar> x, std::span<const Index> layer_0, std::span<const Index> prescribed,
                                  const RigidFrame<Scalar>& pose = {}) noexcept;
     ///@}
 
+    ///@{
     /// The `reaction_error` that a correction would report [N]; nothing moves. For a loop that does without: how far
-    /// can its forces be trusted? 0 if `x` does not have V vertices. Online. Cost: less than half that of a correction.
-    template <class Solver>
+    /// can its forces be trusted? Online. Cost: half that of a correction, most of it where there are few vertices.
+    template <detail::HasQueue Solver>
     [[nodiscard]] Vector3<Scalar> reaction_error(const ConstPointsRef<Scalar>& x, const Solver& solver,
+                                                 const RigidFrame<Scalar>& pose = {}) noexcept {
+        return reaction_error(x, solver.queue().layer(0), solver.prescribed(), pose);
+    }
+    [[nodiscard]] Vector3<Scalar> reaction_error(const ConstPointsRef<Scalar>& x, std::span<const Index> layer_0,
+                                                 std::span<const Index> prescribed,
                                                  const RigidFrame<Scalar>& pose = {}) noexcept;
+    ///@}
 
     /// The coarse points.
     [[nodiscard]] const CoarsePoints& points() const& noexcept { return points_; }
@@ -106,6 +133,13 @@ class CoarseCorrection {
     using Rows = std::vector<PaddedPoint<Scalar>>;  // of each vertex and one more, or of each point; the extra is 0
     using Four = PaddedVector<Scalar>;
 
+    static constexpr std::size_t max_unbalanced = 16;
+    [[nodiscard]] bool has_all(const ConstPointsRef<Scalar>& x) const noexcept {
+        return x.cols() + 1 == static_cast<Eigen::Index>(x_.size());
+    }
+    [[nodiscard]] static Vector3<Scalar> unknown() noexcept {
+        return Vector3<Scalar>::Constant(std::numeric_limits<Scalar>::quiet_NaN());
+    }
     [[nodiscard]] static std::size_t at(Index i) noexcept { return static_cast<std::size_t>(i); }
     [[nodiscard]] static Four load(const PaddedPoint<Scalar>& row) noexcept { return Four::load(row.number.data()); }
     static void store(const Four& four, PaddedPoint<Scalar>& row) noexcept { four.store(row.number.data()); }
@@ -131,22 +165,27 @@ class CoarseCorrection {
     [[nodiscard]] Scalar work_at_trial() noexcept;
     [[nodiscard]] Scalar repetition() const noexcept;
     void advance(PointsRef<Scalar>& x, Scalar step_length, const RigidFrame<Scalar>& pose) noexcept;
+    template <class Queue>
+    [[nodiscard]] std::span<const Index> find_unbalanced(const Queue& queue) noexcept;
 
+    [[nodiscard]] bool is_free(Index v) const noexcept { return !points_.weights(v).empty() && !held_.contains(v); }
     void add_response(std::size_t k, std::size_t i, Scalar force, Rows& displacements) noexcept;
 
     CoarsePoints points_;
     std::vector<std::unique_ptr<ElementForces<Scalar>>> kinds_;
-    Rows compliance_;                          // of the points, by columns [m/N]
-    std::vector<Scalar> tolerance_;            // of the force on each point [N]
-    Rows x_, trial_, displacement_, forces_;   // of vertices, in the frame of the body
-    Rows residual_, step_, last_;              // of points: forces, displacements of this tick and the last one
-    Rows rows_ahead_;                          // of vertices: displaced in advance
-    Scalar repeats_ = 0;                       // the part of `last_` that was
-    std::vector<Scalar> weights_;              // of points in the mean of layer 0
-    std::array<Rows, 3> response_;             // of the points to a force on the held vertices
-    IndexSet held_;                            // layer 0, then those prescribed
-    std::size_t in_contact_ = 0;               // number of the first
-    Scalar contact_motion_ = 0;                // largest displacement of one of them since the last correction [m]
+    Rows compliance_;                         // of the points, by columns [m/N]
+    std::vector<Scalar> tolerance_;           // of the force on each point [N]
+    Rows x_, trial_, displacement_, forces_;  // of vertices, in the frame of the body
+    Rows residual_, step_, last_;             // of points: forces, displacements of this tick and the last one
+    Rows rows_ahead_;                         // of vertices: displaced in advance
+    Scalar repeats_ = 0;                      // the part of `last_` that was
+    std::vector<Scalar> weights_;             // of points in the mean of layer 0
+    std::array<Rows, 3> response_;            // of the points to a force on the held vertices
+    IndexSet held_;                           // layer 0, then those prescribed
+    std::size_t in_contact_ = 0;              // number of the first
+    Scalar contact_motion_ = 0;               // largest displacement of one of them since the last correction [m]
+    Scalar force_tolerance_ = 0;              // of one vertex [N]
+    std::array<Index, max_unbalanced> unbalanced_{};
     Vector3<Scalar> reaction_error_{0, 0, 0};  // in the frame of the body [N]
 };
 
@@ -175,10 +214,10 @@ CoarseCorrection<Scalar>::CoarseCorrection(const TriangleMesh<Scalar>& mesh, con
     for (Rows& rows : response_) rows.resize(at(points_.count()));
     weights_.assign(at(points_.count()), 0);
     tolerance_ = weights_;
+    force_tolerance_ = network.force_tolerance();
     for (Index v = 0; v < count; ++v) {
         x_[at(v)].set(point(mesh.positions(), v));
-        for (const auto& [k, weight] : points_.weights(v))
-            tolerance_[at(k)] += std::abs(weight) * network.force_tolerance();
+        for (const auto& [k, weight] : points_.weights(v)) tolerance_[at(k)] += std::abs(weight) * force_tolerance_;
     }
     invert_stiffness(1.001 * mesh.positions().template cast<double>(), network, foundation);
 }
@@ -233,37 +272,40 @@ template <Real Scalar>
 CoarseReport<Scalar> CoarseCorrection<Scalar>::correct(PointsRef<Scalar> x, std::span<const Index> layer_0,
                                                        std::span<const Index> prescribed,
                                                        const RigidFrame<Scalar>& pose) noexcept {
-    if (x.cols() + 1 != static_cast<Eigen::Index>(x_.size())) return {};
+    if (!has_all(x)) return {.reaction_error = unknown()};
     hold(layer_0, prescribed);
     load_all(x, pose, trial_);
     contact_motion_ = contact_motion(x_, trial_);
     std::swap(x_, trial_);
     find_residual(x_);
+    solve();
+    CoarseReport<Scalar> report{.reaction_error = pose.vector_to_world(reaction_error_)};
     if (is_balanced()) {
         reset();
-        return {};
+        return report;
     }
-    solve();
     interpolate();
     const Scalar at_first = product(residual_, step_), at_trial = work_at_trial();
     if (!is_finite(at_first) || !is_finite(at_trial)) {
         reset();
-        return {};
+        return {.reaction_error = unknown()};
     }
     // By the secant method where the energy would rise again. Steps from extrapolated positions may overshoot: by less
     // than a third they still converge.
     const Scalar work = (std::max)(at_first, Scalar(0));
-    const Scalar length = at_trial < -work / 3 ? work / (work - at_trial) : Scalar(1);
-    advance(x, length, pose);
-    return {true, length, pose.vector_to_world(reaction_error_)};
+    report.corrected = true;
+    report.step_length = at_trial < -work / 3 ? work / (work - at_trial) : Scalar(1);
+    advance(x, report.step_length, pose);
+    return report;
 }
 
 template <Real Scalar>
-template <class Solver>
-Vector3<Scalar> CoarseCorrection<Scalar>::reaction_error(const ConstPointsRef<Scalar>& x, const Solver& solver,
+Vector3<Scalar> CoarseCorrection<Scalar>::reaction_error(const ConstPointsRef<Scalar>& x,
+                                                         std::span<const Index> layer_0,
+                                                         std::span<const Index> prescribed,
                                                          const RigidFrame<Scalar>& pose) noexcept {
-    if (x.cols() + 1 != static_cast<Eigen::Index>(x_.size())) return Vector3<Scalar>::Zero();
-    hold(solver.queue().layer(0), solver.prescribed());
+    if (!has_all(x)) return unknown();
+    hold(layer_0, prescribed);
     load_all(x, pose, trial_);
     find_residual(trial_);
     solve();
@@ -324,7 +366,7 @@ void CoarseCorrection<Scalar>::solve() noexcept {
     for (std::size_t k = 0; k < residual_.size(); ++k) {
         for (std::size_t i = 0; i < 3; ++i) add_response(k, i, residual_[k].number[i], step_);
     }
-    reaction_error_.setZero();
+    reaction_error_ = in_contact_ > 0 ? unknown() : Vector3<Scalar>::Zero();
     if (in_contact_ > 0) hold_contact();
 }
 
@@ -424,6 +466,29 @@ void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length,
         const auto here = static_cast<Index>(v);
         set_point(x, here, Vector3<Scalar>(point(x, here) + pose.vector_to_world(displacement_[v].point())));
     }
+}
+
+// Those with the largest forces, larger than any in the queue.
+template <Real Scalar>
+template <class Queue>
+std::span<const Index> CoarseCorrection<Scalar>::find_unbalanced(const Queue& queue) noexcept {
+    const auto square_of = [&](Index v) { return squared_norm(forces_[at(v)].point()); };
+    Scalar least = force_tolerance_ * force_tolerance_;
+    for (const Index v : queue.vertices()) {
+        if (is_free(v)) least = (std::max)(least, square_of(v));
+    }
+    std::array<std::pair<Scalar, Index>, max_unbalanced> heap;  // the smallest in front
+    std::size_t count = 0;
+    for (Index v = 0; at(v) + 1 < forces_.size(); ++v) {
+        if (!(square_of(v) > least) || !is_free(v) || queue.contains(v)) continue;
+        if (count == heap.size()) std::pop_heap(heap.begin(), heap.end(), std::greater<>());
+        count = (std::min)(count + 1, heap.size());
+        heap[count - 1] = {square_of(v), v};
+        std::push_heap(heap.begin(), heap.begin() + static_cast<std::ptrdiff_t>(count), std::greater<>());
+        if (count == heap.size()) least = heap.front().first;
+    }
+    for (std::size_t i = 0; i < count; ++i) unbalanced_[i] = heap[i].second;
+    return std::span<const Index>(unbalanced_).first(count);
 }
 
 template <Real Scalar>
