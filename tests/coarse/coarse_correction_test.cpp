@@ -155,7 +155,7 @@ TEMPLATE_TEST_CASE("a capsule held at its rim pushes with the force of its equil
             forces += squared_norm<double>(found.reactions[0]);
         }
         CAPTURE(rings);
-        CHECK(std::sqrt(errors / forces) < (sizeof(S) == 4 ? 0.03 : 0.005));  // rounding: the tensions of 2 % are large
+        CHECK(std::sqrt(errors / forces) < (sizeof(S) == 4 ? 0.01 : 0.005));  // rounding: the tensions of 2 % are large
         CHECK(std::sqrt(errors_without / forces) > 0.2);                      // what the layers leave out
     }
 }
@@ -465,13 +465,16 @@ TEST_CASE("the estimate of the reaction's error is within a factor of three of i
     for (const bool grasps : {false, true}) {
         for (const double speed : {0.02, 0.1}) {
             if (!in_full() && grasps == (speed > 0.05)) continue;
+            if (cases_are_slow && grasps) continue;
             for (const bool corrects : {false, true}) compare(6, corrects, grasps, speed);
-            for (const Index layers : {2, 4, 12}) compare(layers, false, grasps, speed);
+            for (const Index layers : {2, 4, 12}) {
+                if (in_full() || layers == 4) compare(layers, false, grasps, speed);
+            }
         }
     }
     const auto check = [](const Agreement& agreement, double within, double below) {
         CAPTURE(agreement.ticks, agreement.within, agreement.below);
-        CHECK(agreement.ticks > 20);
+        CHECK(agreement.ticks > 5);
         CHECK(agreement.within >= within * agreement.ticks);
         CHECK(agreement.below <= below * agreement.ticks);
     };
@@ -515,6 +518,25 @@ TEST_CASE("with unbalanced vertices awake a strip finds the folds that the point
     };
     CHECK(error_of(true) < 0.005);
     CHECK(error_of(false) > 0.01);
+}
+
+TEST_CASE("rounding moves no membrane at rest", "[coarse]") {
+    const auto moves = [](const auto& scene) {
+        CoarseCorrection coarse(scene.mesh, scene.network, scene.foundation);
+        auto x = scene.mesh.positions();
+        return coarse.correct(x, {}, {}).corrected;
+    };
+    for (const Index rings : {4, 8, 14, 28}) {
+        for (const double stretch : {1.0, 1.02, 1.1}) {
+            CAPTURE(rings, stretch);
+            CHECK_FALSE(moves(Capsule<float>(rings, stretch)));
+            CHECK_FALSE(moves(Capsule<double>(rings, stretch)));
+        }
+    }
+    for (const double stiffness : {0.0, 0.4, 40.0}) {
+        CHECK_FALSE(moves(Sphere<float>(stiffness, 3)));
+        CHECK_FALSE(moves(Sphere<double>(stiffness, 3)));
+    }
 }
 
 TEST_CASE("pins, held vertices and a membrane at rest do not move", "[coarse]") {

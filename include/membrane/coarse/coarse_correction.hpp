@@ -217,7 +217,10 @@ CoarseCorrection<Scalar>::CoarseCorrection(const TriangleMesh<Scalar>& mesh, con
     force_tolerance_ = network.force_tolerance();
     for (Index v = 0; v < count; ++v) {
         x_[at(v)].set(point(mesh.positions(), v));
-        for (const auto& [k, weight] : points_.weights(v)) tolerance_[at(k)] += std::abs(weight) * force_tolerance_;
+        for (const auto& [k, weight] : points_.weights(v)) {  // roundings add like random numbers
+            auto& tolerance = tolerance_[at(k)];
+            tolerance = std::hypot(tolerance, static_cast<Scalar>(weight) * force_tolerance_);
+        }
     }
     invert_stiffness(1.001 * mesh.positions().template cast<double>(), network, foundation);
 }
