@@ -19,6 +19,7 @@
 #include <membrane/accuracy/equilibrium.hpp>
 #include <membrane/coarse/coarse_correction.hpp>
 #include <membrane/membrane.hpp>
+#include <membrane/tissue/bending.hpp>
 #include <membrane/tissue/material.hpp>
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
@@ -114,6 +115,7 @@ struct Membrane {
     Mesh mesh;
     Network network;
     Foundation foundation;
+    Points start = mesh.positions();
 };
 
 /// Calls `act` with the constraint of a hand: forceps, or a tool where it touches the membrane.
@@ -130,7 +132,7 @@ template <class M>
 std::vector<Vector> reference(const Path& path, const M& membrane) {
     membrane::ContactTracker<double> tracker(membrane.mesh);
     membrane::AabbTree<double> tree(membrane.mesh);
-    Points x = membrane.mesh.positions();
+    Points x = membrane.start;
     std::vector<Vector> forces;
     for (int t = 0; t < path.ticks; ++t) {
         if (!path.is_compared(t)) continue;
@@ -162,8 +164,9 @@ Result run(const Path& path, const M& membrane, const Setting& setting, const st
     membrane::QuasiStaticSolver<double> solver(membrane.network, setting.solver);
     membrane::ContactTracker<double> tracker(membrane.mesh);
     membrane::AabbTree<double> tree(membrane.mesh);
+    tree.refit(membrane.start);
     membrane::CoarseCorrection coarse(membrane.mesh, membrane.network, membrane.foundation);
-    Points x = membrane.mesh.positions();
+    Points x = membrane.start;
     std::vector<double> seconds;
     double squares = 0, estimated = 0, all = 0, worst = 0, largest = 0;
     auto expected = right.begin();
@@ -219,14 +222,51 @@ void measure(std::ofstream& file, const Path& path, const M& membrane) {
     std::fflush(stdout);
 }
 
-/// A stretched disc of lens capsule with a pinned rim.
-auto stretched_disc(Index rings) {
-    const auto mesh = membrane::disc<double>({.radius = 5e-3, .rings = rings});
-    const membrane::MassSpringNetwork no_springs(mesh, membrane::LinearSpring{},
-                                                 {.stiffness = 0.0, .pinned = membrane::border(mesh)});
-    const membrane::Tissue tissue(
-        no_springs, membrane::triangular_springs(mesh, membrane::materials::lens_capsule().typical, 1.02));
+const membrane::Material capsule = membrane::materials::lens_capsule().typical;
+
+/// Lens capsule, stretched, with pinned vertices and with further elements.
+template <class... Elements>
+auto stretched(const Mesh& mesh, const std::vector<Index>& pinned, double stretch, const Elements&... elements) {
+    const membrane::MassSpringNetwork no_springs(mesh, membrane::LinearSpring{}, {.stiffness = 0.0, .pinned = pinned});
+    const membrane::Tissue tissue(no_springs, membrane::triangular_springs(mesh, capsule, stretch), elements...);
     return Membrane<std::remove_const_t<decltype(tissue)>, membrane::NoFoundation>{mesh, tissue, {}};
+}
+
+/// A disc of 5 mm, pinned at its rim.
+Mesh disc_of(Index rings) { return membrane::disc<double>({.radius = 5e-3, .rings = rings}); }
+auto stretched_disc(Index rings, double stretch = 1.02) {
+    const Mesh mesh = disc_of(rings);
+    return stretched(mesh, membrane::border(mesh), stretch);
+}
+
+/// The same, 30 times as stiff in bending as the capsule.
+auto disc_with_hinges(Index rings) {
+    const Mesh mesh = disc_of(rings);
+    return stretched(mesh, membrane::border(mesh), 1.02,
+                     membrane::bending_springs(mesh, 30 * membrane::flexural_rigidity(capsule)));
+}
+
+/// A disc of springs without tension, pinned at its rim.
+auto slack_disc(Index rings) {
+    const Mesh mesh = disc_of(rings);
+    const membrane::MassSpringNetwork springs(mesh, membrane::LinearSpring{},
+                                              {.stiffness = 20.0, .pinned = membrane::border(mesh)});
+    return Membrane<std::remove_const_t<decltype(springs)>, membrane::NoFoundation>{mesh, springs, {}};
+}
+
+/// A strip of 20 by 5 mm, pinned at its short sides: between them it folds. It starts in equilibrium.
+auto strip() {
+    const Mesh mesh = membrane::sheet<double>({.width = 20e-3, .height = 5e-3, .columns = 80, .rows = 20});
+    std::vector<Index> ends;
+    for (Index v = 0; v < mesh.vertex_count(); ++v) {
+        if (std::abs(mesh.positions()(0, v)) > 9.99e-3) ends.push_back(v);
+    }
+    auto result = stretched(mesh, ends, 1.02);
+    const membrane::PointLoad<double> none = membrane::load({0, 1, 81}, Vector::Constant(1.0 / 3), Vector::Zero());
+    const auto found = membrane::equilibrium(mesh.positions(), mesh, result.network, result.foundation, none);
+    if (!found.converged) throw std::runtime_error("the strip has no equilibrium");
+    result.start = found.x;
+    return result;
 }
 
 /// A sphere on volume springs of a hundredth of its springs' stiffness.
@@ -252,6 +292,12 @@ void run_all(const std::filesystem::path& folder) {
         measure(file, slide("slide at 100 mm/s then held", 160, 10, 30, 3e-3), disc);
         measure(file, draw(disc.mesh), disc);
     }
+    constexpr Index rings = 24;
+    measure(file, slide("tension of 0.5 %", 250, 10, 150, 3e-3), stretched_disc(rings, 1.005));
+    measure(file, slide("tension of 5 %", 250, 10, 150, 3e-3), stretched_disc(rings, 1.05));
+    measure(file, slide("with bending springs", 250, 10, 150, 3e-3), disc_with_hinges(rings));
+    measure(file, slide("without tension", 250, 10, 150, 3e-3), slack_disc(rings));
+    measure(file, slide("strip, then held", 400, 20, 100, 2e-3), strip());
     measure(file, press_on_sphere(), sphere());
 }
 
