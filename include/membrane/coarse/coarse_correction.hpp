@@ -34,8 +34,8 @@ namespace membrane {
 /// Options of a `CoarseCorrection`.
 struct CoarseOptions {
     Index points =
-        128;  ///< number of coarse points, roughly; at most all free vertices. More are more accurate where the
-              ///< contact is small beside their distance, as of forceps
+        128;  ///< number of coarse points, roughly, and none for a few with a pinned rim; at most all free vertices.
+              ///< More are more accurate where the contact is small beside their distance, as of forceps
 
     /// @throws InvalidInput for an option out of its range
     void validate() const;
