@@ -155,16 +155,16 @@ class CoarseCorrection {
 
     // In the order of a correction.
     void hold(std::span<const Index> layer_0, std::span<const Index> prescribed) noexcept;
-    static void load_all(const ConstPointsRef<Scalar>& x, const RigidFrame<Scalar>& pose, Rows& rows) noexcept;
-    [[nodiscard]] Scalar contact_motion(const Rows& before, const Rows& now) const noexcept;
-    void find_residual(const Rows& x) noexcept;
+    void find_residual() noexcept;
+    [[nodiscard]] Vector3<Scalar> solve() noexcept;
+    [[nodiscard]] Vector3<Scalar> hold_contact() noexcept;
+    [[nodiscard]] Scalar contact_motion() const noexcept;
     [[nodiscard]] bool is_balanced() const noexcept;
-    void solve() noexcept;
-    void hold_contact() noexcept;
     void interpolate() noexcept;
     [[nodiscard]] Scalar work_at_trial() noexcept;
-    [[nodiscard]] Scalar repetition() const noexcept;
-    void advance(PointsRef<Scalar>& x, Scalar step_length, const RigidFrame<Scalar>& pose) noexcept;
+    [[nodiscard]] Scalar repetition(Scalar contact_moved) const noexcept;
+    void advance(PointsRef<Scalar>& x, Scalar step_length, Scalar contact_moved,
+                 const RigidFrame<Scalar>& pose) noexcept;
     template <class Queue>
     [[nodiscard]] std::span<const Index> find_unbalanced(const Queue& queue) noexcept;
 
@@ -183,10 +183,8 @@ class CoarseCorrection {
     std::array<Rows, 3> response_;            // of the points to a force on the held vertices
     IndexSet held_;                           // layer 0, then those prescribed
     std::size_t in_contact_ = 0;              // number of the first
-    Scalar contact_motion_ = 0;               // largest displacement of one of them since the last correction [m]
     Scalar force_tolerance_ = 0;              // of one vertex [N]
     std::array<Index, max_unbalanced> unbalanced_{};
-    Vector3<Scalar> reaction_error_{0, 0, 0};  // in the frame of the body [N]
 };
 
 template <class Network, class Volume>
@@ -275,14 +273,10 @@ template <Real Scalar>
 CoarseReport<Scalar> CoarseCorrection<Scalar>::correct(PointsRef<Scalar> x, std::span<const Index> layer_0,
                                                        std::span<const Index> prescribed,
                                                        const RigidFrame<Scalar>& pose) noexcept {
-    if (!has_all(x)) return {.reaction_error = unknown()};
-    hold(layer_0, prescribed);
-    load_all(x, pose, trial_);
-    contact_motion_ = contact_motion(x_, trial_);
+    CoarseReport<Scalar> report{.reaction_error = reaction_error(x, layer_0, prescribed, pose)};
+    if (!has_all(x)) return report;
+    const Scalar moved = contact_motion();
     std::swap(x_, trial_);
-    find_residual(x_);
-    solve();
-    CoarseReport<Scalar> report{.reaction_error = pose.vector_to_world(reaction_error_)};
     if (is_balanced()) {
         reset();
         return report;
@@ -291,14 +285,15 @@ CoarseReport<Scalar> CoarseCorrection<Scalar>::correct(PointsRef<Scalar> x, std:
     const Scalar at_first = product(residual_, step_), at_trial = work_at_trial();
     if (!is_finite(at_first) || !is_finite(at_trial)) {
         reset();
-        return {.reaction_error = unknown()};
+        report.reaction_error = unknown();
+        return report;
     }
     // By the secant method where the energy would rise again. Steps from extrapolated positions may overshoot: by less
     // than a third they still converge.
     const Scalar work = (std::max)(at_first, Scalar(0));
     report.corrected = true;
     report.step_length = at_trial < -work / 3 ? work / (work - at_trial) : Scalar(1);
-    advance(x, report.step_length, pose);
+    advance(x, report.step_length, moved, pose);
     return report;
 }
 
@@ -309,10 +304,9 @@ Vector3<Scalar> CoarseCorrection<Scalar>::reaction_error(const ConstPointsRef<Sc
                                                          const RigidFrame<Scalar>& pose) noexcept {
     if (!has_all(x)) return unknown();
     hold(layer_0, prescribed);
-    load_all(x, pose, trial_);
-    find_residual(trial_);
-    solve();
-    return pose.vector_to_world(reaction_error_);
+    for (Index v = 0; v < x.cols(); ++v) trial_[at(v)].set(pose.point_to_body(point(x, v)));
+    find_residual();
+    return pose.vector_to_world(solve());
 }
 
 template <Real Scalar>
@@ -323,28 +317,13 @@ void CoarseCorrection<Scalar>::hold(std::span<const Index> layer_0, std::span<co
     for (const Index v : prescribed) held_.insert(v);
 }
 
-// The positions of all vertices in the frame of the body.
-template <Real Scalar>
-void CoarseCorrection<Scalar>::load_all(const ConstPointsRef<Scalar>& x, const RigidFrame<Scalar>& pose,
-                                        Rows& rows) noexcept {
-    for (Index v = 0; v < x.cols(); ++v) rows[at(v)].set(pose.point_to_body(point(x, v)));
-}
-
-template <Real Scalar>
-Scalar CoarseCorrection<Scalar>::contact_motion(const Rows& before, const Rows& now) const noexcept {
-    Scalar largest = 0;
-    for (const Index v : held_.items().first(in_contact_))
-        largest = (std::max)(largest, norm<Scalar>(now[at(v)].point() - before[at(v)].point()));
-    return largest;
-}
-
 // The forces on the points: those on the vertices that are not held, times their weights.
 template <Real Scalar>
-void CoarseCorrection<Scalar>::find_residual(const Rows& x) noexcept {
+void CoarseCorrection<Scalar>::find_residual() noexcept {
     clear(forces_);
-    for (const auto& kind : kinds_) kind->add_forces(x, forces_);
+    for (const auto& kind : kinds_) kind->add_forces(trial_, forces_);
     clear(residual_);
-    for (std::size_t v = 0; v + 1 < x.size(); ++v) {
+    for (std::size_t v = 0; v + 1 < forces_.size(); ++v) {
         if (held_.contains(static_cast<Index>(v))) continue;
         const Four force = load(forces_[v]);
         for (const auto& [k, weight] : points_.weights(static_cast<Index>(v))) {
@@ -354,23 +333,14 @@ void CoarseCorrection<Scalar>::find_residual(const Rows& x) noexcept {
     }
 }
 
+// The displacements by the forces on the points. Returns the error of the reaction.
 template <Real Scalar>
-bool CoarseCorrection<Scalar>::is_balanced() const noexcept {
-    for (std::size_t k = 0; k < residual_.size(); ++k) {
-        if (!(norm(residual_[k].point()) <= tolerance_[k])) return false;
-    }
-    return true;
-}
-
-// The displacements by the forces on the points.
-template <Real Scalar>
-void CoarseCorrection<Scalar>::solve() noexcept {
+Vector3<Scalar> CoarseCorrection<Scalar>::solve() noexcept {
     clear(step_);
     for (std::size_t k = 0; k < residual_.size(); ++k) {
         for (std::size_t i = 0; i < 3; ++i) add_response(k, i, residual_[k].number[i], step_);
     }
-    reaction_error_ = in_contact_ > 0 ? unknown() : Vector3<Scalar>::Zero();
-    if (in_contact_ > 0) hold_contact();
+    return in_contact_ > 0 ? hold_contact() : Vector3<Scalar>::Zero();
 }
 
 // Adds the displacements by a force on point `k` along axis `i`.
@@ -384,10 +354,10 @@ void CoarseCorrection<Scalar>::add_response(std::size_t k, std::size_t i, Scalar
 
 // The tool holds layer 0. So the mean displacement of its vertices is reduced to a third, as by a spring twice as stiff
 // as the membrane is there. Without it the points would push a fine membrane off the tool; held wholly it would not
-// follow forceps. The force that would hold it wholly is what the reaction is off: it is how that would change, were
-// the others in equilibrium.
+// follow forceps. Returns the error of the reaction: were the others in equilibrium, it would change by the force that
+// holds layer 0 wholly.
 template <Real Scalar>
-void CoarseCorrection<Scalar>::hold_contact() noexcept {
+Vector3<Scalar> CoarseCorrection<Scalar>::hold_contact() noexcept {
     constexpr Scalar softness = 0.5;
     std::fill(weights_.begin(), weights_.end(), Scalar(0));
     for (const Index v : held_.items().first(in_contact_)) {
@@ -408,13 +378,30 @@ void CoarseCorrection<Scalar>::hold_contact() noexcept {
     const auto& [x, y, z] = columns;
     const Symmetric3<Scalar> compliance{x.x(), y.y(), z.z(), x.y(), x.z(), y.z()};
     const Vector3<Scalar> whole = inverse(compliance) * mean_of(step_), force = whole / (1 + softness);
-    if (!is_finite(whole)) return;
-    reaction_error_ = -whole;
+    if (!is_finite(whole)) return unknown();
     for (std::size_t k = 0; k < step_.size(); ++k) {
         Four sum = load(step_[k]);
         for (std::size_t i = 0; i < 3; ++i) sum = sum - Four(force[i]) * load(response_[i][k]);
         store(sum, step_[k]);
     }
+    return -whole;
+}
+
+// The largest displacement of a vertex of layer 0 since the last correction [m].
+template <Real Scalar>
+Scalar CoarseCorrection<Scalar>::contact_motion() const noexcept {
+    Scalar largest = 0;
+    for (const Index v : held_.items().first(in_contact_))
+        largest = (std::max)(largest, norm<Scalar>(trial_[at(v)].point() - x_[at(v)].point()));
+    return largest;
+}
+
+template <Real Scalar>
+bool CoarseCorrection<Scalar>::is_balanced() const noexcept {
+    for (std::size_t k = 0; k < residual_.size(); ++k) {
+        if (!(norm(residual_[k].point()) <= tolerance_[k])) return false;
+    }
+    return true;
 }
 
 // The displacements of all vertices, and where they would be.
@@ -442,21 +429,21 @@ Scalar CoarseCorrection<Scalar>::work_at_trial() noexcept {
 // How far the displacement of this tick repeats the last one, 0 to 1. No farther than the contact has moved, or it
 // would swing about a contact that stands still.
 template <Real Scalar>
-Scalar CoarseCorrection<Scalar>::repetition() const noexcept {
+Scalar CoarseCorrection<Scalar>::repetition(Scalar contact_moved) const noexcept {
     const Scalar now = product(step_, step_), larger = (std::max)(now, product(last_, last_));
     if (!(larger > 0) || !(now > 0)) return 0;
     Scalar farthest = 0;
     for (const auto& displacement : step_) farthest = (std::max)(farthest, norm(displacement.point()));
-    return (std::min)(contact_motion_ / farthest, Scalar(1)) * (std::max)(product(step_, last_), Scalar(0)) / larger;
+    return (std::min)(contact_moved / farthest, Scalar(1)) * (std::max)(product(step_, last_), Scalar(0)) / larger;
 }
 
 // The displacement of a tick is what was added in advance, and the step.
 template <Real Scalar>
-void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length,
+void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length, Scalar contact_moved,
                                        const RigidFrame<Scalar>& pose) noexcept {
     const Four length(step_length), before(repeats_);
     for (std::size_t k = 0; k < step_.size(); ++k) store(length * load(step_[k]) + before * load(last_[k]), step_[k]);
-    repeats_ = repetition();
+    repeats_ = repetition(contact_moved);
     std::swap(last_, step_);
     for (std::size_t v = 0; v + 1 < x_.size(); ++v) {
         if (points_.weights(static_cast<Index>(v)).empty()) continue;
