@@ -285,46 +285,49 @@ TEST_CASE("pins of a step do not move in a correction", "[coarse]") {
     CHECK(norm<double>(force - expected) < 0.1 * norm(expected));  // the points beside the rim do not know of it
 }
 
-TEST_CASE("a correction lowers the energy, of crumpled membranes in all but few cases", "[coarse]") {
-    const auto energy_of = [](const auto& scene, const Points<double>& x) {
+TEMPLATE_TEST_CASE("a correction lowers the energy, of any membrane from anywhere", "[coarse]", double, float) {
+    using S = TestType;
+    const auto energy_of = [](const auto& scene, const Points<S>& x) {
         double sum = 0;
-        scene.network.for_each_element([&](const auto& one) { sum += one.element.energy(one.where(x)); });
+        scene.network.for_each_element(
+            [&](const auto& one) { sum += one.element.energy(one.where(x.template cast<double>().eval())); });
         if constexpr (requires { scene.foundation.energy(0, point(x, 0)); }) {
-            for (Index v = 0; v < x.cols(); ++v) sum += scene.foundation.energy(v, point(x, v));
+            for (Index v = 0; v < x.cols(); ++v) sum += static_cast<double>(scene.foundation.energy(v, point(x, v)));
         }
         return sum;
     };
-    int steps = 0;
-    const auto rises_of = [&](const auto& scene, double size) {
-        int rises = 0;
-        for (int seed = 1; seed <= cases(100, 1000); ++seed) {
+    const double rounding = sizeof(S) == 4 ? 1e-3 : 1e-12;  // of positions
+    const auto check = [&](const auto& scene, S size) {
+        CAPTURE(size);
+        int rises = 0, falls = 0;
+        for (int seed = 1; seed <= cases(20, 1000); ++seed) {
             test::Random random(static_cast<std::uint64_t>(seed));
-            CoarseCorrection coarse(scene.mesh, scene.network, scene.foundation, {.points = 20});
+            CoarseCorrection coarse(scene.mesh, scene.network, scene.foundation, {.points = 20 + 3 * seed % 80});
             // Waves of some millimetres, and noise.
-            Points<double> x = test::jittered(scene.mesh.positions(), size / 20, random);
-            const auto wave = random.vector<double>(-600, 600), along = random.vector<double>(-size, size);
+            Points<S> x = test::jittered(scene.mesh.positions(), size / 20, random);
+            const auto wave = random.template vector<S>(-600, 600), along = random.template vector<S>(-size, size);
             for (Index v = 0; v < x.cols(); ++v) {
-                x.col(v) += std::sin(dot<double>(wave, point(x, v))) * along;
+                x.col(v) += std::sin(dot<S>(wave, point(x, v))) * along;
                 if (scene.network.pinned(v)) x.col(v) = scene.mesh.positions().col(v);
             }
-            for (int n = 0; n < 5; ++n, ++steps) {
+            for (int n = 0; n < 5; ++n) {
                 const double before = energy_of(scene, x);
-                CHECK(coarse.correct(x, {}, {}).step_length <= 1);
-                if (energy_of(scene, x) > before * (1 + 1e-12)) ++rises;
+                const S length = coarse.correct(x, {}, {}).step_length;
+                CHECK((length >= 0 && length <= 1));
+                const double after = energy_of(scene, x);
+                if (after > before * (1 + rounding)) ++rises;
+                if (after < before) ++falls;
             }
         }
-        return rises;
+        CHECK(rises == 0);
+        CHECK(falls > cases(20, 1000));
     };
-    for (const double size : {1e-6, 1e-5, 1e-4}) {
-        CAPTURE(size);
-        CHECK(rises_of(Capsule<double>(8), size) == 0);
-        CHECK(rises_of(Sphere<double>(0.4), size) == 0);
-        CHECK(rises_of(Sphere<double>(40), size) == 0);
+    for (const S size : {S(1e-5), S(1e-4), S(2e-3)}) {
+        check(Capsule<S>(8), size);
+        check(Capsule<S>(8, 1), size);  // slack
+        check(Sphere<S>(0.4), size);
+        check(Sphere<S>(40), size);
     }
-    steps = 0;
-    const int rises = rises_of(Capsule<double>(8), 2e-3) + rises_of(Sphere<double>(0.4), 3e-4) +
-                      rises_of(Sphere<double>(0.4), 2e-3) + rises_of(Sphere<double>(40), 2e-3);
-    CHECK(rises <= 0.01 * steps);
 }
 
 TEST_CASE("after any stroke a corrected membrane comes back to rest", "[coarse]") {

@@ -16,7 +16,7 @@
 #include <membrane/solve/packed_elements.hpp>
 #include <membrane/tissue/elements.hpp>
 
-/// The forces of a whole membrane, several elements at a time.
+/// The forces of a whole membrane, and changes of its energy, several elements at a time.
 ///
 ///     const auto kinds = membrane::element_forces(network, foundation);                 // offline
 ///     for (const auto& kind : kinds) kind->add_forces(x, forces);                       // [N]
@@ -37,14 +37,16 @@ class ElementForces {
     /// Adds the forces of the elements at positions `x` [m] to those on their vertices [N]. Online.
     virtual void add_forces(const Rows& x, Rows& forces) const noexcept = 0;
 
-    /// The sum of these forces times displacements of their vertices [J]. Online.
-    [[nodiscard]] virtual Scalar work(const Rows& x, const Rows& displacements) const noexcept = 0;
+    /// By how much the energy at positions `y` is larger than at `x` [J]; of a foundation by the mean of its forces,
+    /// which is exact where it is linear. Online.
+    [[nodiscard]] virtual Scalar energy_change(const Rows& x, const Rows& y) const noexcept = 0;
 };
 
 namespace detail {
 
 /// Elements of which several are evaluated at once. `Kind` names the number of their corners, and packs their
-/// constants; its `for_each_force(constants, x, act)` calls `act(i, force)` for each corner.
+/// constants; its `for_each_force(constants, x, act)` calls `act(i, force)` for each corner, and its
+/// `energy_change(constants, x, y)` is that of each lane.
 template <Real Scalar, class Kind>
 class ForcesInLanes final : public ElementForces<Scalar> {
   public:
@@ -66,19 +68,20 @@ class ForcesInLanes final : public ElementForces<Scalar> {
     }
 
     void add_forces(const Rows& x, Rows& forces) const noexcept override {
-        for_each_force(x, [&](const Begins& corners, const Vector3<Wide>& force) {
-            for (std::size_t lane = 0; lane < lanes; ++lane) {  // two lanes may have the same vertex
-                Scalar* sum = forces.front().number.data() + corners[lane];
-                sum[0] += force.x()[lane], sum[1] += force.y()[lane], sum[2] += force.z()[lane];
-            }
-        });
+        for (const Pack& pack : packs_) {
+            kind_.for_each_force(pack.constants, corners_of(pack, x), [&](std::size_t i, const Vector3<Wide>& force) {
+                for (std::size_t lane = 0; lane < lanes; ++lane) {  // two lanes may have the same vertex
+                    Scalar* sum = forces.front().number.data() + pack.corners[i][lane];
+                    sum[0] += force.x()[lane], sum[1] += force.y()[lane], sum[2] += force.z()[lane];
+                }
+            });
+        }
     }
 
-    [[nodiscard]] Scalar work(const Rows& x, const Rows& displacements) const noexcept override {
+    [[nodiscard]] Scalar energy_change(const Rows& x, const Rows& y) const noexcept override {
         Wide sum = 0;
-        for_each_force(x, [&](const Begins& corners, const Vector3<Wide>& force) {
-            sum += dot<Wide>(force, gather(displacements.data(), corners.data()));
-        });
+        for (const Pack& pack : packs_)
+            sum += kind_.energy_change(pack.constants, corners_of(pack, x), corners_of(pack, y));
         Scalar all = 0;
         for (std::size_t lane = 0; lane < lanes; ++lane) all += sum[lane];
         return all;
@@ -94,14 +97,10 @@ class ForcesInLanes final : public ElementForces<Scalar> {
         std::array<Begins, Kind::corner_count> corners{};
     };
 
-    template <class Act>
-    void for_each_force(const Rows& x, const Act& act) const noexcept {
-        for (const Pack& pack : packs_) {
-            Corners<Wide, Kind::corner_count> corners;
-            for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = gather(x.data(), pack.corners[i].data());
-            kind_.for_each_force(pack.constants, corners,
-                                 [&](std::size_t i, const Vector3<Wide>& force) { act(pack.corners[i], force); });
-        }
+    [[nodiscard]] static auto corners_of(const Pack& pack, const Rows& rows) noexcept {
+        Corners<Wide, Kind::corner_count> corners;
+        for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = gather(rows.data(), pack.corners[i].data());
+        return corners;
     }
 
     Kind kind_;
@@ -116,7 +115,7 @@ struct SpringKind {
     static constexpr std::size_t corner_count = 2;
     using Instance = ElementInstance<SpringElement<Scalar, Law>>;
     struct Constants {
-        Lanes<Scalar> stiffness = 0, rest_length = 0;
+        Lanes<Scalar> stiffness = 0, rest_length = 1;  // a law may divide by it
     };
 
     static void set(Constants& constants, std::size_t lane, const Instance& spring) noexcept {
@@ -129,6 +128,12 @@ struct SpringKind {
         const auto force = spring_force<Lanes<Scalar>>(law, edge, constants.stiffness, constants.rest_length).force();
         act(0, force);
         act(1, Vector3<Lanes<Scalar>>(-force));
+    }
+    [[nodiscard]] Lanes<Scalar> energy_change(const Constants& constants, const Corners<Lanes<Scalar>, 2>& x,
+                                              const Corners<Lanes<Scalar>, 2>& y) const noexcept {
+        const SpringElement<Lanes<Scalar>, Law> spring{&law, constants.stiffness, constants.rest_length};
+        const Lanes<Scalar> before = norm<Lanes<Scalar>>(x[1] - x[0]), after = norm<Lanes<Scalar>>(y[1] - y[0]);
+        return spring.response(after).energy - spring.response(before).energy;
     }
 
     Law law;
@@ -149,6 +154,11 @@ struct ElementKind {
                                const Act& act) noexcept {
         for (std::size_t i = 0; i < corner_count; ++i) act(i, constants.force_on(x, i).force);
     }
+    [[nodiscard]] static Lanes<Scalar> energy_change(const Constants& constants,
+                                                     const Corners<Lanes<Scalar>, corner_count>& x,
+                                                     const Corners<Lanes<Scalar>, corner_count>& y) noexcept {
+        return constants.energy(y) - constants.energy(x);
+    }
 };
 
 /// Elements `E` of a tissue that do not take lanes.
@@ -164,11 +174,23 @@ struct ElementKind<Scalar, E, false> {
     template <class Act>
     static void for_each_force(const Constants& constants, const Corners<Lanes<Scalar>, corner_count>& x,
                                const Act& act) noexcept {
+        const auto all = lane_by_lane(constants);
+        for (std::size_t i = 0; i < corner_count; ++i) act(i, all.force_on(x, i).force);
+    }
+    [[nodiscard]] static Lanes<Scalar> energy_change(const Constants& constants,
+                                                     const Corners<Lanes<Scalar>, corner_count>& x,
+                                                     const Corners<Lanes<Scalar>, corner_count>& y) noexcept {
+        const auto all = lane_by_lane(constants);
+        return all.energy(y) - all.energy(x);
+    }
+
+  private:
+    [[nodiscard]] static auto lane_by_lane(const Constants& constants) noexcept {
         LaneByLane<E, Scalar> all;
         for (std::size_t lane = 0; lane < constants.size(); ++lane) {
             if (constants[lane]) all.of_lane[lane] = &*constants[lane];
         }
-        for (std::size_t i = 0; i < corner_count; ++i) act(i, all.force_on(x, i).force);
+        return all;
     }
 };
 
@@ -181,46 +203,58 @@ struct OnFoundation {
 
 /// The forces of a foundation without damping, in lanes.
 template <Real Scalar, class Volume, bool in_lanes = SpringsInLanes<Volume, Scalar>>
-struct FoundationKind {
-    static constexpr std::size_t corner_count = 1;
-    using Instance = OnFoundation<Volume>;
+struct SpringsOfFoundation {
     using Constants = InLanes<SpringOf<Volume, Scalar>>;
 
-    static void set(Constants& constants, std::size_t lane, const Instance& on) noexcept {
+    static void set(Constants& constants, std::size_t lane, const OnFoundation<Volume>& on) noexcept {
         set_lane(constants, lane, on.foundation->spring(on.corners[0], Vector3<Scalar>::Zero(), Scalar(1)));
     }
-    template <class Act>
-    static void for_each_force(const Constants& constants, const Corners<Lanes<Scalar>, 1>& x,
-                               const Act& act) noexcept {
-        act(0, constants.elastic_force(x[0]).force);
+    [[nodiscard]] static auto force_on(const Constants& constants, const Vector3<Lanes<Scalar>>& x) noexcept {
+        return constants.elastic_force(x).force;
     }
 };
 
 /// The forces of a foundation that does not take lanes.
 template <Real Scalar, class Volume>
-struct FoundationKind<Scalar, Volume, false> {
-    static constexpr std::size_t corner_count = 1;
-    using Instance = OnFoundation<Volume>;
+struct SpringsOfFoundation<Scalar, Volume, false> {
     struct Constants {
         const Volume* foundation = nullptr;
         std::array<Index, Lanes<Scalar>::count> vertex;
     };
 
-    static void set(Constants& constants, std::size_t lane, const Instance& on) noexcept {
+    static void set(Constants& constants, std::size_t lane, const OnFoundation<Volume>& on) noexcept {
         if (!constants.foundation) constants.vertex.fill(no_index);
         constants.foundation = on.foundation;
         constants.vertex[lane] = on.corners[0];
     }
-    template <class Act>
-    static void for_each_force(const Constants& constants, const Corners<Lanes<Scalar>, 1>& x,
-                               const Act& act) noexcept {
+    [[nodiscard]] static auto force_on(const Constants& constants, const Vector3<Lanes<Scalar>>& x) noexcept {
         Vector3<Lanes<Scalar>> all = Vector3<Lanes<Scalar>>::Zero();
         for (std::size_t lane = 0; lane < constants.vertex.size(); ++lane) {
             if (constants.vertex[lane] == no_index) continue;
-            const auto here = lane_of<Vector3<Scalar>>(x[0], lane);
+            const auto here = lane_of<Vector3<Scalar>>(x, lane);
             set_lane(all, lane, constants.foundation->force_on(constants.vertex[lane], here, here, Scalar(1)).force);
         }
-        act(0, all);
+        return all;
+    }
+};
+
+/// Vertices on a foundation.
+template <Real Scalar, class Volume>
+struct FoundationKind : SpringsOfFoundation<Scalar, Volume> {
+    static constexpr std::size_t corner_count = 1;
+    using Instance = OnFoundation<Volume>;
+    using typename SpringsOfFoundation<Scalar, Volume>::Constants;
+    using Wide = Lanes<Scalar>;
+
+    template <class Act>
+    static void for_each_force(const Constants& constants, const Corners<Wide, 1>& x, const Act& act) noexcept {
+        act(0, FoundationKind::force_on(constants, x[0]));
+    }
+    [[nodiscard]] static Wide energy_change(const Constants& constants, const Corners<Wide, 1>& x,
+                                            const Corners<Wide, 1>& y) noexcept {
+        const Vector3<Wide> both =
+            FoundationKind::force_on(constants, x[0]) + FoundationKind::force_on(constants, y[0]);
+        return -dot<Wide>(both, y[0] - x[0]) / Wide(2);
     }
 };
 
@@ -240,7 +274,11 @@ template <class Network, class Volume, Real Scalar = typename Network::Scalar>
     };
     const auto add_springs = [&](const auto& springs) {
         using Law = std::remove_cvref_t<decltype(springs.law())>;
-        add(detail::SpringKind<Scalar, Law>{springs.law()}, [&](const auto& put) { springs.for_each_element(put); });
+        add(detail::SpringKind<Scalar, Law>{springs.law()}, [&](const auto& put) {
+            springs.for_each_element([&](const auto& spring) {
+                if (spring.element.stiffness != 0) put(spring);  // a tissue may have none
+            });
+        });
     };
     if constexpr (HasElements<Network>) {
         add_springs(network.springs());

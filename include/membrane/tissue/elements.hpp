@@ -97,6 +97,7 @@ template <class E, class Scalar>
 concept ElementInLanes = StructOfNumbers<E> &&
     requires(const InLanes<E>& element, const Corners<Lanes<Scalar>, E::corner_count>& x, std::size_t i) {
     { element.force_on(x, i) } -> std::same_as<CornerForce<Lanes<Scalar>>>;
+    { element.energy(x) } -> std::same_as<Lanes<Scalar>>;
     { element.energy_change(x, i, x[i]) } -> std::same_as<EnergyChange<Lanes<Scalar>>>;
 };
 
@@ -116,6 +117,13 @@ struct LaneByLane {
         }
         return all;
     }
+    [[nodiscard]] Lanes<Scalar> energy(const Corners<Lanes<Scalar>, E::corner_count>& x) const noexcept {
+        Lanes<Scalar> all = 0;
+        for (std::size_t lane = 0; lane < of_lane.size(); ++lane) {
+            if (of_lane[lane]) all.set(lane, static_cast<Scalar>(of_lane[lane]->energy(corners_of<double>(x, lane))));
+        }
+        return all;
+    }
     [[nodiscard]] EnergyChange<Lanes<Scalar>> energy_change(const Corners<Lanes<Scalar>, E::corner_count>& x,
                                                             std::size_t i,
                                                             const Vector3<Lanes<Scalar>>& displacement) const noexcept {
@@ -131,9 +139,11 @@ struct LaneByLane {
 
   private:
     [[nodiscard]] static CornerForce<Scalar> none() noexcept { return {.remainder = {}}; }
+    template <Real N = Scalar>
     [[nodiscard]] static auto corners_of(const Corners<Lanes<Scalar>, E::corner_count>& x, std::size_t lane) noexcept {
-        Corners<Scalar, E::corner_count> corners;
-        for (std::size_t k = 0; k < corners.size(); ++k) corners[k] = lane_of<Vector3<Scalar>>(x[k], lane);
+        Corners<N, E::corner_count> corners;
+        for (std::size_t k = 0; k < corners.size(); ++k)
+            corners[k] = lane_of<Vector3<Scalar>>(x[k], lane).template cast<N>();
         return corners;
     }
 };
