@@ -852,7 +852,12 @@ TEST_CASE("pages: coarse") {
     // [/reaction_error]
     CHECK(report.reactions[0].z() > 0);
     CHECK(norm(error) > 0);
-    CHECK_FALSE(trusted);  // a ball that appears inside
+    CHECK(trusted);
+    auto deeper = tool;
+    deeper.position.z() -= 0.1e-3;
+    const auto uncorrected =
+        solver.step(x, dt, network, foundation, press(deeper, tracker.update(tree, x, deeper))).total_reaction();
+    CHECK(norm(coarse.reaction_error(x, solver)) > 0.01 * norm(uncorrected));
     CHECK(coarse.points().count() > 60);
 }
 
@@ -924,6 +929,40 @@ TEST_CASE("pages: a flap that forceps tear") {
     }
     CHECK(tear.torn_length() > edge);
     CHECK(length > 0.5 * tear.torn_length());
+}
+
+TEST_CASE("pages: coarse_tear") {
+    const auto mesh = membrane::with_reserve(membrane::disc<double>({.radius = 0.005, .rings = 8}), 50);
+    const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
+                                                     {.stiffness = 20.0, .pinned = membrane::border(mesh)});
+    auto tissue = membrane::Tissue(membrane::TearableSprings(mesh, network));
+    auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 1e-3});
+    auto solver = membrane::QuasiStaticSolver(tissue, {.layers = 4});
+    auto tear = membrane::Tearing(mesh, membrane::EnergyRelease{.toughness = 10, .thickness = 12e-6});
+    membrane::CoarseCorrection coarse(mesh, tissue, foundation);
+    membrane::Points<double> x = mesh.positions();
+    const double dt = 1e-3;
+    for (const auto& event : tear.cut_along(tear.slit_at(0, {1, 0, 0}), x)) {
+        follow(event, tissue, foundation, solver, coarse);
+    }
+    membrane::PointAttachment<double> forceps{0, tear.surface().corners(0), {0.4, 0.3, 0.3}, {0, 0, 0}};
+    forceps.target = membrane::point_at(membrane::triangle_at(mesh.positions(), forceps.corners), forceps.barycentric);
+    for (int i = 0; i < 300; ++i) {
+        forceps.target += Eigen::Vector3d(0, 0, 5e-6);
+        forceps.corners = tear.surface().corners(0);
+        // [coarse_tear]
+        const auto report = solver.step(x, dt, tissue, foundation, forceps, tear.ligaments());
+        const auto corrected = coarse.correct(x, solver);
+        solver.wake(corrected.unbalanced);
+        for (const auto& event : tear.update(x, dt, tissue, foundation, forceps.corners)) {
+            follow(event, tissue, foundation, solver, coarse);
+        }
+        // [/coarse_tear]
+        REQUIRE(report.status == membrane::StepStatus::advanced);
+        REQUIRE(corrected.reaction_error.eigen().allFinite());
+    }
+    CHECK(tear.torn_length() > 0.001);
+    CHECK(x.row(2).maxCoeff() > 1e-3);
 }
 
 TEST_CASE("pages: tear_reset") {

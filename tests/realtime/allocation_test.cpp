@@ -152,6 +152,20 @@ TEST_CASE("nor does a coarse correction", "[allocation]") {
     CHECK(x.row(2).minCoeff() < -5e-4);
 }
 
+TEST_CASE("nor does one of a membrane that tears", "[allocation][tear]") {
+    test::WildTear<double> loop(3);
+    CoarseCorrection coarse(loop.mesh, loop.sheet, loop.foundation, {.points = 20});
+    long allocated = 0;
+    loop.follow_too = [&](const auto& event) { allocated += allocated_by([&] { follow(event, coarse); }); };
+    for (int tick = 0; tick < 200; ++tick) {
+        (void)loop.tick(
+            [&](const auto&...) { allocated += allocated_by([&] { (void)coarse.correct(loop.x, loop.solver); }); });
+        loop.tree.refit(loop.x);
+    }
+    CHECK(loop.splits > 0);
+    CHECK(allocated == 0);
+}
+
 TEST_CASE("nor does a step that several threads share", "[allocation]") {
     const auto mesh = icosphere<float>({.radius = 1, .subdivisions = 4});
     const MassSpringNetwork<float, LinearSpring> network(mesh, {}, {.stiffness = 1});

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <limits>
 #include <span>
 
@@ -144,9 +145,10 @@ struct WildTear {
     membrane::Tool<Scalar> tool;
     Index held = 0;
     Vector target;
-    double nonsense_chance = 0.1;  // of an input that no step takes
-    double deadline = 0;           // of a step [readings of its clock]; 0: none
-    int splits = 0, slips = 0;     // of vertices; of tissue through the jaws
+    double nonsense_chance = 0.1;                                        // of an input that no step takes
+    double deadline = 0;                                                 // of a step [readings of its clock]; 0: none
+    int splits = 0, slips = 0;                                           // of vertices; of tissue through the jaws
+    std::function<void(const membrane::TearEvent<Scalar>&)> follow_too;  // called for each event after these parts
     bool grasps = false,
          grasps_surface = true;  // whether the forceps hold a point; whether that is of the torn surface
 
@@ -196,6 +198,7 @@ struct WildTear {
     void follow(std::span<const membrane::TearEvent<Scalar>> events) {
         for (const auto& event : events) {
             membrane::follow(event, sheet, foundation, adhesion, solver, tree, tracker, grasper, friction, normals);
+            if (follow_too) follow_too(event);
             splits += event.split.vertex != membrane::no_index ? 1 : 0;
         }
     }

@@ -48,6 +48,7 @@ template <class Solver>
 concept HasQueue = requires(const Solver& solver) {
     { solver.queue().layer(0) } -> std::convertible_to<std::span<const Index>>;
     { solver.prescribed() } -> std::convertible_to<std::span<const Index>>;
+    { solver.splits() } -> std::same_as<Index>;
 };
 
 }  // namespace detail
@@ -75,12 +76,13 @@ struct CoarseReport {
 /// keeps its shape between the points, unless `CoarseReport::unbalanced` is woken. The method and its error: README.md
 /// in this folder.
 ///
-/// One thread at a time for each instance. The membrane must not tear. Its foundation may move as a rigid body.
+/// One thread at a time for each instance. The membrane may tear, and its foundation move as a rigid body.
 template <Real Scalar>
-class CoarseCorrection {
+class CoarseCorrection : public SplitCount {
   public:
-    /// Copies network and foundation, but for a foundation that does not take `Lanes`, which must outlive it. On a
-    /// moving body the foundation is that of the body at rest.
+    /// Copies network and foundation; those of a membrane that tears must outlive it, at their place, as must a
+    /// foundation that does not take `Lanes`. On a moving body the foundation is that of the body at rest. `mesh` is
+    /// that of `TornSurface` if the membrane has torn before.
     /// @throws InvalidInput for a network or foundation of other vertices than the mesh's, an option out of its range,
     /// or a stiffness at rest that is not finite, or zero. Cost: O(V log V) for each point, the cube of their number.
     template <ElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume>
@@ -91,11 +93,13 @@ class CoarseCorrection {
     /// Corrects `x` (3 x V [m]) after a step of `solver`; or with layer 0 of its queue, and the prescribed vertices.
     /// `pose` is that of the body, `body.pose()` of a `MovingBody`: network and foundation turn with it, a `DeadLoad`
     /// as well. Of elastic elements and a linear foundation the energy falls, but for what is repeated in advance. If
-    /// `x` does not have V vertices, nothing moves. Online. Cost: the forces and one or two changes of the energy of
-    /// all elements, some 30 products for each vertex, nine for each pair of points.
+    /// `x` does not have V vertices, or the solver has followed other splits, nothing moves. Online. Cost: the forces
+    /// and one or two changes of the energy of all elements, some 30 products for each vertex, nine for each pair of
+    /// points.
     template <detail::HasQueue Solver>
     CoarseReport<Scalar> correct(PointsRef<Scalar> x, const Solver& solver,
                                  const RigidFrame<Scalar>& pose = {}) noexcept {
+        if (solver.splits() != splits_) return {.reaction_error = unknown()};
         auto report = correct(x, solver.queue().layer(0), solver.prescribed(), pose);
         if (has_all(x)) report.unbalanced = find_unbalanced(solver.queue());
         return report;
@@ -110,12 +114,24 @@ class CoarseCorrection {
     template <detail::HasQueue Solver>
     [[nodiscard]] Vector3<Scalar> reaction_error(const ConstPointsRef<Scalar>& x, const Solver& solver,
                                                  const RigidFrame<Scalar>& pose = {}) noexcept {
+        if (solver.splits() != splits_) return unknown();
         return reaction_error(x, solver.queue().layer(0), solver.prescribed(), pose);
     }
     [[nodiscard]] Vector3<Scalar> reaction_error(const ConstPointsRef<Scalar>& x, std::span<const Index> layer_0,
                                                  std::span<const Index> prescribed,
                                                  const RigidFrame<Scalar>& pose = {}) noexcept;
     ///@}
+
+    ///@{
+    /// The membrane has torn: a copy has the displacements of its vertex, points and their stiffness stay as they are.
+    /// The next correction calls `update`. Online.
+    void split(const VertexSplit& split) noexcept;
+    void reshape(const MovedVertex<Scalar>&) noexcept { has_changed_ = true; }
+    ///@}
+
+    /// Reads network and foundation again, which have changed, as `CohesiveSprings` that fail. They must outlive this.
+    /// Online. Cost: about half that of a correction.
+    void update() noexcept;
 
     /// The coarse points.
     [[nodiscard]] const CoarsePoints& points() const& noexcept { return points_; }
@@ -127,7 +143,8 @@ class CoarseCorrection {
     /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        visit(self.x_, self.last_, self.repeats_, self.length_, self.rows_ahead_);
+        visit(self.x_, self.last_, self.repeats_, self.length_, self.rows_ahead_, self.points_, self.splits_);
+        if constexpr (Visit::restores) self.has_changed_ = self.may_tear_;
     }
 
   private:
@@ -187,6 +204,7 @@ class CoarseCorrection {
     IndexSet held_;                           // layer 0, then those prescribed
     std::size_t in_contact_ = 0;              // number of the first
     Scalar force_tolerance_ = 0;              // of one vertex [N]
+    bool may_tear_ = false, has_changed_ = false;
     std::array<Index, max_unbalanced> unbalanced_{};
 };
 
@@ -203,7 +221,7 @@ template <ElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume>
 CoarseCorrection<Scalar>::CoarseCorrection(const TriangleMesh<Scalar>& mesh, const Network& network,
                                            const Volume& foundation, const CoarseOptions& options)
     : points_((options.validate(), mesh), network, options.points), held_(mesh.vertex_count()) {
-    static_assert(!FollowsSplit<Network>, "CoarseCorrection: the membrane must not tear");
+    if constexpr (FollowsSplit<Network>) may_tear_ = true, splits_ = network.splits();
     constexpr bool moves = requires { foundation.body(); };
     static_assert(!moves, "CoarseCorrection: pass the foundation of the body at rest, and its pose to `correct`");
     const Index count = mesh.vertex_count();
@@ -301,6 +319,7 @@ Vector3<Scalar> CoarseCorrection<Scalar>::reaction_error(const ConstPointsRef<Sc
                                                          std::span<const Index> prescribed,
                                                          const RigidFrame<Scalar>& pose) noexcept {
     if (!has_all(x)) return unknown();
+    if (has_changed_) update();
     hold(layer_0, prescribed);
     for (Index v = 0; v < x.cols(); ++v) trial_[at(v)].set(pose.point_to_body(point(x, v)));
     find_residual();
@@ -494,6 +513,20 @@ std::span<const Index> CoarseCorrection<Scalar>::find_unbalanced(const Queue& qu
     }
     for (std::size_t i = 0; i < count; ++i) unbalanced_[i] = heap[i].second;
     return std::span<const Index>(unbalanced_).first(count);
+}
+
+template <Real Scalar>
+void CoarseCorrection<Scalar>::split(const VertexSplit& split) noexcept {
+    ++splits_;
+    has_changed_ = true;
+    points_.split(split);
+    for (Rows* rows : {&x_, &rows_ahead_}) (*rows)[at(split.copy)] = (*rows)[at(split.vertex)];
+}
+
+template <Real Scalar>
+void CoarseCorrection<Scalar>::update() noexcept {
+    has_changed_ = false;
+    for (const auto& kind : kinds_) kind->update();
 }
 
 template <Real Scalar>

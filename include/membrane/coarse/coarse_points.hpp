@@ -17,6 +17,7 @@
 #include <membrane/core/compressed_rows.hpp>
 #include <membrane/model/elastic_network.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// Few points of a membrane, and the weights with which they displace the others.
 ///
@@ -46,11 +47,24 @@ class CoarsePoints {
     [[nodiscard]] Index count() const noexcept { return count_; }
 
     /// The points that displace vertex `v`; none if it is pinned.
-    [[nodiscard]] std::span<const Weight> weights(Index v) const& noexcept { return weights_[v]; }
+    [[nodiscard]] std::span<const Weight> weights(Index v) const& noexcept {
+        return weights_[row_[static_cast<std::size_t>(v)]];
+    }
     void weights(Index) && = delete;
 
     /// The largest distance of a vertex from the nearest point, along edges [m].
     [[nodiscard]] double spacing() const noexcept { return spacing_; }
+
+    /// A vertex becomes two: the points displace the copy as the vertex. Online.
+    void split(const VertexSplit& split) noexcept {
+        row_[static_cast<std::size_t>(split.copy)] = row_[static_cast<std::size_t>(split.vertex)];
+    }
+
+    /// Visits what a tear changes, see `replay/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.row_);
+    }
 
   private:
     static constexpr double range = 2.5;  // of a point, in spacings
@@ -74,6 +88,7 @@ class CoarsePoints {
     std::vector<Index> points_;  // vertices
     std::vector<Index> number_;  // of each point among those that are not pinned, or `no_index`
     CompressedRows<Weight> weights_;
+    std::vector<Index> row_;  // of each vertex in these
     Index count_ = 0;
     double spacing_ = 0;
 };
@@ -109,6 +124,7 @@ CoarsePoints::CoarsePoints(const TriangleMesh<Scalar>& mesh, const Network& netw
     distances = far_off;
     add_points(graph, pins, spacing_, unlimited, pinned, distances);
     add_points(graph, joined, spacing_, unlimited, pinned, distances);
+    for (Index v = 0; v < mesh.vertex_count(); ++v) row_.push_back(v);
     for (const Index v : points_) number_.push_back(network.pinned(v) ? no_index : count_++);
     find_weights(rest, graph, pinned);
 }

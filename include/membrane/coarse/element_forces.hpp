@@ -40,31 +40,44 @@ class ElementForces {
     /// By how much the energy at positions `y` is larger than at `x` [J]; of a foundation by the mean of its forces,
     /// which is exact where it is linear. Online.
     [[nodiscard]] virtual Scalar energy_change(const Rows& x, const Rows& y) const noexcept = 0;
+
+    /// Reads network and foundation again, which have changed: a tear, adhesion that fails. Online. Cost: about that of
+    /// the forces.
+    virtual void update() noexcept = 0;
 };
 
 namespace detail {
 
 /// Elements of which several are evaluated at once. `Kind` names the number of their corners, and packs their
 /// constants; its `for_each_force(constants, x, act)` calls `act(i, force)` for each corner, and its
-/// `energy_change(constants, x, y)` is that of each lane.
-template <Real Scalar, class Kind>
+/// `energy_change(constants, x, y)` is that of each lane. `source(put)` calls `put` for each element.
+template <Real Scalar, class Kind, class Source>
 class ForcesInLanes final : public ElementForces<Scalar> {
   public:
     using typename ElementForces<Scalar>::Rows;
 
-    /// Without elements, of a mesh of `vertex_count` vertices.
-    ForcesInLanes(Kind kind, Index vertex_count) : kind_(std::move(kind)), spare_(begin_of_row(vertex_count)) {}
+    /// Of a mesh of `vertex_count` vertices, for at most `capacity` elements.
+    ForcesInLanes(Kind kind, Source source, Index vertex_count, std::size_t capacity)
+        : kind_(std::move(kind)),
+          source_(std::move(source)),
+          spare_(begin_of_row(vertex_count)),
+          packs_((capacity + lanes - 1) / lanes) {
+        ForcesInLanes::update();
+    }
 
-    /// Appends an element.
-    void append(const typename Kind::Instance& instance) {
-        if (count_ % lanes == 0) {
-            packs_.emplace_back();
-            for (auto& corner : packs_.back().corners) corner.fill(spare_);
+    void update() noexcept override {
+        for (Pack& pack : packs_) {
+            pack = {};
+            for (auto& corner : pack.corners) corner.fill(spare_);
         }
-        const std::size_t lane = count_++ % lanes;
-        kind_.set(packs_.back().constants, lane, instance);
-        for (std::size_t i = 0; i < Kind::corner_count; ++i)
-            packs_.back().corners[i][lane] = begin_of_row(instance.corners[i]);
+        std::size_t count = 0;
+        source_([&](const typename Kind::Instance& instance) {
+            Pack& pack = packs_[count / lanes];
+            const std::size_t lane = count++ % lanes;
+            kind_.set(pack.constants, lane, instance);
+            for (std::size_t i = 0; i < Kind::corner_count; ++i)
+                pack.corners[i][lane] = begin_of_row(instance.corners[i]);
+        });
     }
 
     void add_forces(const Rows& x, Rows& forces) const noexcept override {
@@ -104,9 +117,9 @@ class ForcesInLanes final : public ElementForces<Scalar> {
     }
 
     Kind kind_;
+    Source source_;
     Index spare_;
     std::vector<Pack> packs_;
-    std::size_t count_ = 0;
 };
 
 /// Springs of a law.
@@ -260,38 +273,36 @@ struct FoundationKind : SpringsOfFoundation<Scalar, Volume> {
 
 }  // namespace detail
 
-/// The forces of all kinds of elements of a network, and of the foundation, which must outlive the result unless its
-/// springs take lanes. Offline. Cost: linear.
+/// The forces of all kinds of elements of a network, and of the foundation. Both must outlive the result, at their
+/// place, if `update` is called; else a foundation whose springs do not take lanes. Offline. Cost: linear.
 template <class Network, class Volume, Real Scalar = typename Network::Scalar>
 [[nodiscard]] std::vector<std::unique_ptr<ElementForces<Scalar>>> element_forces(const Network& network,
                                                                                  const Volume& volume) {
     const Index vertex_count = network.vertex_count();
     std::vector<std::unique_ptr<ElementForces<Scalar>>> all;
-    const auto add = [&]<class Kind>(const Kind& kind, const auto& for_each_instance) {
-        auto forces = std::make_unique<detail::ForcesInLanes<Scalar, Kind>>(kind, vertex_count);
-        for_each_instance([&](const auto& instance) { forces->append(instance); });
-        all.push_back(std::move(forces));
+    const auto add = [&]<class Kind, class Source>(const Kind& kind, std::size_t capacity, const Source& source) {
+        all.push_back(
+            std::make_unique<detail::ForcesInLanes<Scalar, Kind, Source>>(kind, source, vertex_count, capacity));
     };
     const auto add_springs = [&](const auto& springs) {
         using Law = std::remove_cvref_t<decltype(springs.law())>;
-        add(detail::SpringKind<Scalar, Law>{springs.law()}, [&](const auto& put) {
-            springs.for_each_element([&](const auto& spring) {
-                if (spring.element.stiffness != 0) put(spring);  // a tissue may have none
-            });
-        });
+        add(detail::SpringKind<Scalar, Law>{springs.law()}, springs.spring_capacity(),
+            [&springs](const auto& put) { springs.for_each_element(put); });
     };
     if constexpr (HasElements<Network>) {
         add_springs(network.springs());
         network.for_each_kind([&]<class E>(const Elements<Scalar, E>& elements) {
-            add(detail::ElementKind<Scalar, E>(), [&](const auto& put) { elements.for_each_element(put); });
+            add(detail::ElementKind<Scalar, E>(), elements.all().size(),
+                [&elements](const auto& put) { elements.for_each_element(put); });
         });
     } else {
         add_springs(network);
     }
     if constexpr (!std::same_as<Volume, NoFoundation>) {
-        add(detail::FoundationKind<Scalar, Volume>(), [&](const auto& put) {
-            for (Index v = 0; v < vertex_count; ++v) put(detail::OnFoundation<Volume>{{v}, &volume});
-        });
+        add(detail::FoundationKind<Scalar, Volume>(), static_cast<std::size_t>(vertex_count),
+            [&volume, vertex_count](const auto& put) {
+                for (Index v = 0; v < vertex_count; ++v) put(detail::OnFoundation<Volume>{{v}, &volume});
+            });
     }
     return all;
 }

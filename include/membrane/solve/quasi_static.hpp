@@ -58,7 +58,7 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 /// (queue, vertices awake, packed springs, contact forces) is a cache: `reset` it if constants of the network change.
 /// One thread at a time for each solver.
 template <Real Scalar, CheckedStepRule<Scalar> Rule = BlockStep>
-class QuasiStaticSolver {
+class QuasiStaticSolver : public SplitCount {
   public:
     /// `executor` is for orders in which several threads may update vertices.
     /// @throws InvalidInput for options out of range, or a rule that needs masses the network does not have.
@@ -245,7 +245,6 @@ class QuasiStaticSolver {
     bool complete_ = false;           // the last step made all its vertex updates
     RigidFrame<Scalar> pose_;         // of the body at the last step
     std::uint64_t deformations_ = 0;  // of the body at the last step
-    Index splits_ = 0;                // of a tear, until now
     Scalar asleep_below_ = 0;         // no vertex that has moved is asleep under a larger force than this [N]
     std::size_t resume_ = 0;          // number beyond layer 0 of the vertex at which time ran out
     StepCosts costs_;
