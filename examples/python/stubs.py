@@ -27,7 +27,7 @@ TAKEN = {"Vector3": "numpy.typing.ArrayLike", "Field": "numpy.typing.ArrayLike |
          r"os\.PathLike": "str | os.PathLike[str]"}
 GIVEN = {"Vector3": ARRAY, r"List\[int\[\d\]\]": "list[int]", r"List\[": "list["}
 VARIADIC = {"follow": "*parts: TearableSprings | Tissue | Foundation | QuasiStaticSolver | AabbTree | ContactTracker | "
-                      "Grasper | VertexNormals | ToolFriction"}
+                      "Grasper | VertexNormals | ToolFriction | CoarseCorrection"}
 LITERAL = re.compile(r"-?[\d.]+(e-?\d+)?|True|False|None")
 
 

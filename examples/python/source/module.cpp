@@ -116,6 +116,7 @@ PYBIND11_MODULE(_membrane, module) {
     bind_material(module);
     bind_contact(module);
     bind_solve(module);
+    bind_coarse(module);
     bind_tear(module);
     bind_haptics(module);
     bind_recording(module);

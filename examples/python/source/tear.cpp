@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <pybind11/stl.h>
 
+#include "coarse.hpp"
 #include "loop_call.hpp"
 #include "solver.hpp"
 
@@ -132,6 +133,7 @@ template <class Of>
 [[nodiscard]] auto& part_of(Forceps& of) { return of.grasper; }
 [[nodiscard]] auto& part_of(ToolFriction& of) { return of; }
 [[nodiscard]] auto& part_of(Solver& of) { return of.any; }
+[[nodiscard]] auto& part_of(Coarse& of) { return of.coarse; }
 [[nodiscard]] auto& part_of(Network& of) { return of.any; }
 [[nodiscard]] auto& part_of(Foundation& of) { return of.any; }
 ///@}
@@ -181,7 +183,7 @@ void with_part(const py::handle& object, Act act) {
     const bool found =
         try_classes(std::type_identity<Network>(), std::type_identity<Foundation>(), std::type_identity<Solver>(),
                     std::type_identity<Tree>(), std::type_identity<Tracker>(), std::type_identity<Forceps>(),
-                    std::type_identity<Normals>(), std::type_identity<ToolFriction>());
+                    std::type_identity<Normals>(), std::type_identity<ToolFriction>(), std::type_identity<Coarse>());
     if (!found) refuse_part();
 }
 

@@ -279,6 +279,7 @@ void bind_model(py::module_& module);
 void bind_material(py::module_& module);
 void bind_contact(py::module_& module);
 void bind_solve(py::module_& module);
+void bind_coarse(py::module_& module);
 void bind_tear(py::module_& module);
 void bind_haptics(py::module_& module);
 void bind_recording(py::module_& module);

@@ -327,6 +327,34 @@ def start():
     return numpy.concatenate([numbers, x.ravel()])
 
 
+def coarse():
+    """A ball is pressed into a stretched disc that its rim holds, corrected after each step; then it tears."""
+    mesh = membrane.with_reserve(membrane.disc(radius=5e-3, rings=8), 60)
+    tissue = membrane.Tissue(membrane.TearableSprings(
+        mesh, membrane.MassSpringNetwork(mesh, stiffness=20.0, pinned=membrane.border(mesh))))
+    foundation = membrane.NoFoundation()
+    coarse = membrane.CoarseCorrection(mesh, tissue, foundation, points=40)
+    solver = membrane.QuasiStaticSolver(tissue, layers=3, sweeps=2)
+    tree, tracker = membrane.AabbTree(mesh), membrane.ContactTracker(mesh)
+    tear = membrane.Tearing(mesh, membrane.EnergyRelease(toughness=200, thickness=1e-5))
+    x = mesh.positions.copy()
+    numbers: list[float] = []
+    for tick in range(100):
+        if tick == 50:
+            for event in tear.cut_along(tear.slit_at(0, (1, 0, 0)), x):
+                membrane.follow(event, tissue, solver, tree, tracker, coarse)
+        tool = membrane.Tool(position=(1e-3, 0, 1e-3 - 4e-6 * tick), radius=1e-3)
+        contact = tracker.update(tree, x, tool)
+        report = solver.step(x, dt, tissue, foundation, membrane.press(tool, contact), tear.ligaments())
+        numbers.extend(coarse.reaction_error(x, solver))
+        corrected = coarse.correct(x, solver)
+        solver.wake(corrected.unbalanced)
+        tree.refit(x)
+        numbers.extend([*report.reactions[0], *corrected.reaction_error, corrected.corrected, corrected.step_length,
+                        len(corrected.unbalanced), *corrected.unbalanced])
+    return numpy.concatenate([numbers, x.ravel()])
+
+
 def time_ticks(ticks):
     """The loop of the README for this number of ticks: the nanoseconds of each."""
     mesh = membrane.icosphere(radius=10e-3, subdivisions=3)

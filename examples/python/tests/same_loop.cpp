@@ -14,6 +14,7 @@
 #include <membrane/calibration/fit.hpp>
 #include <membrane/calibration/indentation.hpp>
 #include <membrane/certify/error_bound.hpp>
+#include <membrane/coarse/coarse_correction.hpp>
 #include <membrane/haptics/force_limits.hpp>
 #include <membrane/membrane.hpp>
 #include <membrane/meshing/distmesh.hpp>
@@ -356,6 +357,39 @@ void tear() {
     tear_disc(mesh, membrane::TearableSprings(mesh, taut), membrane::LargestTension{.strength = 15});
 }
 
+/// A ball is pressed into a stretched disc that its rim holds, corrected after each step; then it tears.
+void coarse() {
+    const auto mesh = membrane::with_reserve(membrane::disc<double>({.radius = 5e-3, .rings = 8}), 60);
+    auto tissue = membrane::Tissue(membrane::TearableSprings(
+        mesh, membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
+                                          {.stiffness = 20.0, .pinned = membrane::border(mesh)})));
+    const membrane::NoFoundation foundation;
+    membrane::CoarseCorrection coarse(mesh, tissue, foundation, {.points = 40});
+    auto solver = membrane::QuasiStaticSolver(tissue, {.layers = 3, .sweeps = 2});
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    auto tear = membrane::Tearing(mesh, membrane::EnergyRelease{.toughness = 200, .thickness = 1e-5});
+    auto x = mesh.positions();
+    for (int tick = 0; tick < 100; ++tick) {
+        if (tick == 50) {
+            for (const auto& event : tear.cut_along(tear.slit_at(0, {1, 0, 0}), x))
+                follow(event, tissue, solver, tree, tracker, coarse);
+        }
+        const membrane::Tool<double> tool{.position = {1e-3, 0, 1e-3 - 4e-6 * tick}, .radius = 1e-3};
+        const auto contact = tracker.update(tree, x, tool);
+        const auto report = solver.step(x, dt, tissue, foundation, press(tool, contact), tear.ligaments());
+        print(coarse.reaction_error(x, solver));
+        const auto corrected = coarse.correct(x, solver);
+        solver.wake(corrected.unbalanced);
+        tree.refit(x);
+        print(report.reactions[0]);
+        print(corrected.reaction_error);
+        std::printf("%d %.17g %zu\n", corrected.corrected, corrected.step_length, corrected.unbalanced.size());
+        for (const membrane::Index v : corrected.unbalanced) std::printf("%d\n", v);
+    }
+    print_points(x);
+}
+
 /// A stretched strip tears from a flaw of its border, and where a tool perforates it that drags it by friction.
 void start() {
     const auto whole = membrane::sheet<double>({.width = 8e-3, .height = 4e-3, .columns = 16, .rows = 8});
@@ -450,8 +484,9 @@ void time_ticks(int ticks) {
 int main(int argc, char** argv) {
     const std::string_view name = argc > 1 ? argv[1] : "";
     const std::pair<std::string_view, void (*)()> scenes[] = {
-        {"sphere", sphere},     {"cap", cap},   {"offline", offline},   {"published", published}, {"law", law},
-        {"accuracy", accuracy}, {"peel", peel}, {"friction", friction}, {"tear", tear},           {"start", start}};
+        {"sphere", sphere}, {"cap", cap},           {"offline", offline}, {"published", published},
+        {"law", law},       {"accuracy", accuracy}, {"peel", peel},       {"friction", friction},
+        {"tear", tear},     {"start", start},       {"coarse", coarse}};
     for (const auto& [scene, run] : scenes) {
         if (name == scene) return run(), 0;
     }

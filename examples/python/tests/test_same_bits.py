@@ -18,7 +18,7 @@ def numbers_of(name):
 
 @pytest.mark.skipif(not PROGRAM, reason="MEMBRANE_SAME_LOOP is the program, compiled of same_loop.cpp")
 @pytest.mark.parametrize("name", ["sphere", "cap", "offline", "published", "law", "accuracy", "peel", "friction",
-                                  "tear", "start"])
+                                  "tear", "start", "coarse"])
 def test_same_bits(name):
     native, python = numbers_of(name), numpy.ravel(getattr(loops, name)())
     assert native.size == python.size and native.size > 300

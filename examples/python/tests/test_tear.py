@@ -465,3 +465,45 @@ def test_adhesion_by_its_law():
     assert adhesion.dissipated == pytest.approx(area * energy, rel=1e-12)
     adhesion.reset()
     assert adhesion.adheres.all() and adhesion.dissipated == 0 and not adhesion.damage.any()
+
+
+def test_a_correction_follows_a_tear_and_is_refused_where_it_has_not():
+    disc = Torn()
+    coarse = membrane.CoarseCorrection(disc.mesh, disc.springs, disc.foundation, points=30)
+    disc.solver.step(disc.x, 1e-3, disc.springs, disc.foundation)
+    assert coarse.correct(disc.x, disc.solver).step_length <= 1
+    for count, event in enumerate(disc.cut()):
+        membrane.follow(event, disc.springs, disc.foundation, disc.solver)
+        missed = f"CoarseCorrection: the solver must have followed the same {count} events of a tear, got {count + 1}"
+        with pytest.raises(ValueError, match=missed):
+            coarse.correct(disc.x, disc.solver)
+        with pytest.raises(ValueError, match=missed):
+            coarse.reaction_error(disc.x, disc.solver)
+        membrane.follow(event, coarse)
+    disc.solver.wake_all()
+    disc.solver.step(disc.x, 1e-3, disc.springs, disc.foundation)
+    report = coarse.correct(disc.x, disc.solver)
+    assert report.corrected and numpy.isfinite(report.reaction_error).all()
+    with pytest.raises(ValueError, match="x must"):
+        coarse.correct(disc.x[1:], disc.solver)
+    with pytest.raises(ValueError, match="points must be at least 1, got 0"):
+        membrane.CoarseCorrection(disc.mesh, disc.springs, disc.foundation, points=0)
+    coarse.update()
+    coarse.reset()
+
+
+def test_a_correction_keeps_its_network_and_raises_the_error_of_its_law():
+    broken: list[str] = []
+    disc = Torn(membrane.PythonSpring(law_until(broken)))
+    coarse = membrane.CoarseCorrection(disc.mesh, disc.springs, disc.foundation, points=30)
+    solver = disc.solver
+    solver.wake_all()
+    solver.step(disc.x, 1e-3, disc.springs, disc.foundation)
+    x = disc.x
+    del disc
+    gc.collect()
+    coarse.update()
+    assert coarse.correct(x, solver).corrected
+    broken.append("law")
+    with pytest.raises(RuntimeError, match="what is a spring"):
+        coarse.correct(x, solver)
