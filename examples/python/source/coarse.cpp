@@ -2,6 +2,7 @@
 #include "coarse.hpp"
 
 #include <memory>
+#include <utility>
 
 #include "loop_call.hpp"
 #include "solver.hpp"
@@ -52,12 +53,11 @@ void bind_report(py::module_& module) {
 void bind_coarse(py::module_& module) {
     bind_report(module);
     auto coarse = py::class_<Coarse>(module, "CoarseCorrection", doc("CoarseCorrection"));
-    coarse.def(py::init([](const Mesh& mesh, const Network& network, const Foundation& foundation, Index points) {
-                   return coarse_of(mesh, network, foundation, {.points = points});
-               }),
-               py::arg("mesh"), py::arg("network"), py::arg("foundation"), py::kw_only(),
-               py::arg("points") = CoarseOptions{}.points, py::keep_alive<1, 3>(), py::keep_alive<1, 4>(),
-               doc("CoarseOptions::points"));
+    const Keywords options("CoarseOptions", std::pair("points", &CoarseOptions::points),
+                           std::pair("period", &CoarseOptions::period));
+    options.def_init(coarse, options.taking<const Mesh&, const Network&, const Foundation&>(&coarse_of),
+                     py::arg("mesh"), py::arg("network"), py::arg("foundation"), py::keep_alive<1, 3>(),
+                     py::keep_alive<1, 4>());
     def_in_loop<py::return_value_policy::reference_internal>(
         coarse, "correct",
         [](Coarse& self, MovingPositions x, const Solver& solver) -> Report& {

@@ -36,6 +36,9 @@ struct CoarseOptions {
     Index points =
         128;  ///< number of coarse points, roughly, and none for a few with a pinned rim; at most all free vertices.
               ///< More are more accurate where the contact is small beside their distance, as of forceps
+    Index period =
+        1;  ///< one of so many calls corrects; the others repeat the last displacement, as far as the contact
+            ///< moves on: a fraction of the cost
 
     /// @throws InvalidInput for an option out of its range
     void validate() const;
@@ -56,10 +59,11 @@ concept HasQueue = requires(const Solver& solver) {
 /// What a correction did.
 template <Real Scalar>
 struct CoarseReport {
-    bool corrected = false;  ///< whether it displaced the membrane; false at equilibrium, or if a number was not finite
+    bool corrected = false;  ///< false if it repeated the last one, at equilibrium, or if a number was not finite
     Scalar step_length = 0;  ///< by which the line search multiplied the displacement, 0 to 1
     /// An estimate of the error of the step: the sum of its reactions to tools and forceps, less that of the same step
-    /// solved to the end [N]. 0 without a constraint, NaN if there is no estimate. Only its size counts.
+    /// solved to the end [N]. 0 without a constraint, NaN if there is no estimate, as between two corrections. Only its
+    /// size counts.
     Vector3<Scalar> reaction_error = Vector3<Scalar>::Zero();
     /// Vertices beyond the queue with a larger residual force than any in it, the largest 16: what is finer than the
     /// points. For `solver.wake`. Valid until the next correction.
@@ -100,8 +104,9 @@ class CoarseCorrection : public SplitCount {
     CoarseReport<Scalar> correct(PointsRef<Scalar> x, const Solver& solver,
                                  const RigidFrame<Scalar>& pose = {}) noexcept {
         if (solver.splits() != splits_) return {.reaction_error = unknown()};
+        const bool evaluates = ticks_ >= period_;
         auto report = correct(x, solver.queue().layer(0), solver.prescribed(), pose);
-        if (has_all(x)) report.unbalanced = find_unbalanced(solver.queue());
+        if (has_all(x) && evaluates) report.unbalanced = find_unbalanced(solver.queue());
         return report;
     }
     CoarseReport<Scalar> correct(PointsRef<Scalar> x, std::span<const Index> layer_0, std::span<const Index> prescribed,
@@ -143,7 +148,8 @@ class CoarseCorrection : public SplitCount {
     /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        visit(self.x_, self.last_, self.repeats_, self.length_, self.rows_ahead_, self.points_, self.splits_);
+        visit(self.x_, self.last_, self.repeats_, self.length_, self.advanced_, self.motion_, self.ticks_,
+              self.rows_ahead_, self.points_, self.splits_);
         if constexpr (Visit::restores) self.has_changed_ = self.may_tear_;
     }
 
@@ -173,6 +179,7 @@ class CoarseCorrection : public SplitCount {
 
     // In the order of a correction.
     void hold(std::span<const Index> layer_0, std::span<const Index> prescribed) noexcept;
+    void find_positions(const ConstPointsRef<Scalar>& x, const RigidFrame<Scalar>& pose) noexcept;
     void find_residual() noexcept;
     [[nodiscard]] Vector3<Scalar> solve() noexcept;
     [[nodiscard]] Vector3<Scalar> hold_contact() noexcept;
@@ -182,8 +189,10 @@ class CoarseCorrection : public SplitCount {
     [[nodiscard]] Scalar search_line(Scalar work) noexcept;
     [[nodiscard]] Scalar energy_change(Scalar length) noexcept;
     [[nodiscard]] Scalar repetition(Scalar contact_moved) const noexcept;
-    void advance(PointsRef<Scalar>& x, Scalar step_length, Scalar contact_moved,
-                 const RigidFrame<Scalar>& pose) noexcept;
+    void repeat(PointsRef<Scalar>& x, std::span<const Index> layer_0, std::span<const Index> prescribed,
+                const RigidFrame<Scalar>& pose) noexcept;
+    void advance(PointsRef<Scalar>& x, Scalar step_length, const RigidFrame<Scalar>& pose) noexcept;
+    void displace(PointsRef<Scalar>& x, Index v, const Four& displacement, const RigidFrame<Scalar>& pose) noexcept;
     template <class Queue>
     [[nodiscard]] std::span<const Index> find_unbalanced(const Queue& queue) noexcept;
 
@@ -199,6 +208,9 @@ class CoarseCorrection : public SplitCount {
     Rows rows_ahead_;                         // of vertices: displaced in advance
     Scalar repeats_ = 0;                      // the part of `last_` that was
     Scalar length_ = 1;                       // of the last step
+    Scalar advanced_ = 1;                     // how often `rows_ahead_` were added
+    Scalar motion_ = 0;                       // of the contact in the tick of the last correction [m]
+    Index period_, ticks_ = period_;          // of corrections, and since the last one
     std::vector<Scalar> weights_;             // of points in the mean of layer 0
     std::array<Rows, 3> response_;            // of the points to a force on the held vertices
     IndexSet held_;                           // layer 0, then those prescribed
@@ -214,13 +226,16 @@ CoarseCorrection(const TriangleMesh<typename Network::Scalar>&, const Network&, 
 
 inline void CoarseOptions::validate() const {
     if (points < 1) refuse("CoarseCorrection", "points must be at least 1, got ", points);
+    if (period < 1) refuse("CoarseCorrection", "period must be at least 1, got ", period);
 }
 
 template <Real Scalar>
 template <ElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume>
 CoarseCorrection<Scalar>::CoarseCorrection(const TriangleMesh<Scalar>& mesh, const Network& network,
                                            const Volume& foundation, const CoarseOptions& options)
-    : points_((options.validate(), mesh), network, options.points), held_(mesh.vertex_count()) {
+    : points_((options.validate(), mesh), network, options.points),
+      period_(options.period),
+      held_(mesh.vertex_count()) {
     if constexpr (FollowsSplit<Network>) may_tear_ = true, splits_ = network.splits();
     constexpr bool moves = requires { foundation.body(); };
     static_assert(!moves, "CoarseCorrection: pass the foundation of the body at rest, and its pose to `correct`");
@@ -294,22 +309,25 @@ template <Real Scalar>
 CoarseReport<Scalar> CoarseCorrection<Scalar>::correct(PointsRef<Scalar> x, std::span<const Index> layer_0,
                                                        std::span<const Index> prescribed,
                                                        const RigidFrame<Scalar>& pose) noexcept {
+    if (ticks_ < period_) {
+        repeat(x, layer_0, prescribed, pose);
+        return {.reaction_error = unknown()};
+    }
     CoarseReport<Scalar> report{.reaction_error = reaction_error(x, layer_0, prescribed, pose)};
     if (!has_all(x)) return report;
-    const Scalar moved = contact_motion();
+    motion_ = contact_motion();
     std::swap(x_, trial_);
-    if (is_balanced()) {
-        reset();
-        return report;
+    if (!is_balanced()) {
+        interpolate();
+        report.step_length = search_line(product(residual_, step_));
     }
-    interpolate();
-    report.step_length = search_line(product(residual_, step_));
     report.corrected = report.step_length > 0;
     if (report.corrected) {
-        advance(x, report.step_length, moved, pose);
+        advance(x, report.step_length, pose);
     } else {
         reset();
     }
+    ticks_ = 1;
     return report;
 }
 
@@ -321,7 +339,7 @@ Vector3<Scalar> CoarseCorrection<Scalar>::reaction_error(const ConstPointsRef<Sc
     if (!has_all(x)) return unknown();
     if (has_changed_) update();
     hold(layer_0, prescribed);
-    for (Index v = 0; v < x.cols(); ++v) trial_[at(v)].set(pose.point_to_body(point(x, v)));
+    find_positions(x, pose);
     find_residual();
     return pose.vector_to_world(solve());
 }
@@ -332,6 +350,13 @@ void CoarseCorrection<Scalar>::hold(std::span<const Index> layer_0, std::span<co
     for (const Index v : layer_0) held_.insert(v);
     in_contact_ = held_.items().size();
     for (const Index v : prescribed) held_.insert(v);
+}
+
+// The positions in the frame of the body.
+template <Real Scalar>
+void CoarseCorrection<Scalar>::find_positions(const ConstPointsRef<Scalar>& x,
+                                              const RigidFrame<Scalar>& pose) noexcept {
+    for (Index v = 0; v < x.cols(); ++v) trial_[at(v)].set(pose.point_to_body(point(x, v)));
 }
 
 // The forces on the points: those on the vertices that are not held, times their weights.
@@ -471,25 +496,49 @@ Scalar CoarseCorrection<Scalar>::repetition(Scalar contact_moved) const noexcept
     return (std::min)(contact_moved / farthest, Scalar(1)) * (std::max)(product(step_, last_), Scalar(0)) / larger;
 }
 
-// The displacement of a tick is what was added in advance, and the step.
+// The displacement of a tick is what was added in advance, and its part of the step.
 template <Real Scalar>
-void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length, Scalar contact_moved,
+void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length,
                                        const RigidFrame<Scalar>& pose) noexcept {
-    const Four length(step_length), before(repeats_);
-    for (std::size_t k = 0; k < step_.size(); ++k) store(length * load(step_[k]) + before * load(last_[k]), step_[k]);
-    repeats_ = repetition(contact_moved);
+    const Four length(step_length), part(1 / advanced_), before(repeats_);
+    for (std::size_t k = 0; k < step_.size(); ++k)
+        store(part * length * load(step_[k]) + before * load(last_[k]), step_[k]);
+    repeats_ = repetition(motion_);
+    advanced_ = 1;
     std::swap(last_, step_);
     for (std::size_t v = 0; v + 1 < x_.size(); ++v) {
         if (points_.weights(static_cast<Index>(v)).empty()) continue;
         const Four moved = length * load(displacement_[v]);
-        const Four again = Four(repeats_) * (moved + load(rows_ahead_[v]));
+        const Four again = Four(repeats_) * (part * moved + load(rows_ahead_[v]));
         store(again, rows_ahead_[v]);
-        if (held_.contains(static_cast<Index>(v))) continue;
-        store(moved + again, displacement_[v]);
-        store(load(x_[v]) + load(displacement_[v]), x_[v]);
-        const auto here = static_cast<Index>(v);
-        set_point(x, here, Vector3<Scalar>(point(x, here) + pose.vector_to_world(displacement_[v].point())));
+        if (!held_.contains(static_cast<Index>(v))) displace(x, static_cast<Index>(v), moved + again, pose);
     }
+}
+
+// Adds what is ahead once more, by the part that the contact has moved of what it moved before.
+template <Real Scalar>
+void CoarseCorrection<Scalar>::repeat(PointsRef<Scalar>& x, std::span<const Index> layer_0,
+                                      std::span<const Index> prescribed, const RigidFrame<Scalar>& pose) noexcept {
+    if (!has_all(x)) return;
+    ++ticks_;
+    hold(layer_0, prescribed);
+    find_positions(x, pose);
+    const Scalar moved = contact_motion(), part = moved < motion_ ? moved / motion_ : Scalar(1);
+    std::swap(x_, trial_);
+    advanced_ += part;
+    for (Index v = 0; v < x.cols(); ++v) {
+        if (is_free(v)) displace(x, v, Four(part) * load(rows_ahead_[at(v)]), pose);
+    }
+}
+
+// Moves a vertex, by a displacement in the frame of the body.
+template <Real Scalar>
+void CoarseCorrection<Scalar>::displace(PointsRef<Scalar>& x, Index v, const Four& displacement,
+                                        const RigidFrame<Scalar>& pose) noexcept {
+    store(load(x_[at(v)]) + displacement, x_[at(v)]);
+    PaddedPoint<Scalar> row;
+    store(displacement, row);
+    set_point(x, v, Vector3<Scalar>(point(x, v) + pose.vector_to_world(row.point())));
 }
 
 // Those with the largest forces, larger than any in the queue.
@@ -533,8 +582,9 @@ template <Real Scalar>
 void CoarseCorrection<Scalar>::reset() noexcept {
     clear(last_);
     clear(rows_ahead_);
-    repeats_ = 0;
-    length_ = 1;
+    repeats_ = motion_ = 0;
+    length_ = advanced_ = 1;
+    ticks_ = period_;
 }
 
 }  // namespace membrane
