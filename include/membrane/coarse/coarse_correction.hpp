@@ -33,12 +33,12 @@ namespace membrane {
 
 /// Options of a `CoarseCorrection`.
 struct CoarseOptions {
-    Index points =
-        128;  ///< number of coarse points, roughly, and none for a few with a pinned rim; at most all free vertices.
-              ///< More are more accurate where the contact is small beside their distance, as of forceps
-    Index period =
-        1;  ///< one of so many calls corrects; the others repeat the last displacement, as far as the contact
-            ///< moves on: a fraction of the cost
+    /// Number of coarse points, roughly, and none for a few with a pinned rim; at most all free vertices. More are more
+    /// accurate where the contact is small beside their distance, as of forceps.
+    Index points = 128;
+    /// Each call of `correct` of so many corrects. Those between repeat its displacement, by as much as the contact
+    /// moves on, at a fraction of the cost.
+    Index period = 1;
 
     /// @throws InvalidInput for an option out of its range
     void validate() const;
