@@ -16,6 +16,7 @@
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/mesh_checks.hpp>
 #include <membrane/surface/shapes.hpp>
+#include <membrane/tear/cohesive_springs.hpp>
 #include <membrane/tear/tearing.hpp>
 #include <membrane/tissue/bending.hpp>
 #include <membrane/tissue/material.hpp>
@@ -159,6 +160,31 @@ TEST_CASE("a corrected membrane that was torn is whole again after a reset, to t
     };
     const auto first = run();
     REQUIRE(whole.reset(capsule.tear, capsule.tissue, capsule.solver, capsule.coarse, capsule.x));
+    CHECK(same_bits(first, run()));
+}
+
+TEST_CASE("a corrected membrane that was peeled adheres again after a reset, to the bit", "[coarse][snapshot]") {
+    const auto mesh = disc<double>({.radius = 0.005, .rings = 8});
+    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 20.0, .pinned = border(mesh)});
+    CohesiveSprings<double> adhesion(mesh, {.stiffness = 1e7, .strength = 100.0, .energy = 2e-3});
+    CoarseCorrection coarse(mesh, network, adhesion, {.points = 20});
+    QuasiStaticSolver solver(network, {.layers = 2});
+    Points<double> x = mesh.positions();
+    std::vector<Index> all;
+    for (Index v = 0; v < mesh.vertex_count(); ++v) all.push_back(v);
+    const InitialState whole(adhesion, solver, coarse, x);
+    const auto run = [&] {
+        for (int tick = 1; tick <= 60; ++tick) {
+            (void)solver.step(x, 1e-3, network, adhesion, pull(Index(0), Vector3<double>(0, 0, 1e-5 * tick)));
+            (void)coarse.correct(x, solver);
+            adhesion.update(x, all);
+            coarse.update();
+        }
+        return Points<double>(x);
+    };
+    const auto first = run();
+    CHECK(adhesion.dissipated() > 0);
+    REQUIRE(whole.reset(adhesion, solver, coarse, x));
     CHECK(same_bits(first, run()));
 }
 

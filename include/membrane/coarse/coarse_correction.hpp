@@ -148,9 +148,10 @@ class CoarseCorrection : public SplitCount {
     /// Visits what is kept from tick to tick, see `replay/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
+        [[maybe_unused]] const bool changes = self.changes_;
         visit(self.x_, self.last_, self.repeats_, self.length_, self.advanced_, self.motion_, self.ticks_,
-              self.rows_ahead_, self.points_, self.splits_);
-        if constexpr (Visit::restores) self.has_changed_ = self.may_tear_;
+              self.rows_ahead_, self.points_, self.splits_, self.changes_);
+        if constexpr (Visit::restores) self.has_changed_ = self.changes_ = self.changes_ || changes;
     }
 
   private:
@@ -201,22 +202,22 @@ class CoarseCorrection : public SplitCount {
 
     CoarsePoints points_;
     std::vector<std::unique_ptr<ElementForces<Scalar>>> kinds_;
-    Rows compliance_;                         // of the points, by columns [m/N]
-    std::vector<Scalar> tolerance_;           // of the force on each point [N]
-    Rows x_, trial_, displacement_, forces_;  // of vertices, in the frame of the body
-    Rows residual_, step_, last_;             // of points: forces, displacements of this tick and the last one
-    Rows rows_ahead_;                         // of vertices: displaced in advance
-    Scalar repeats_ = 0;                      // the part of `last_` that was
-    Scalar length_ = 1;                       // of the last step
-    Scalar advanced_ = 1;                     // how often `rows_ahead_` were added
-    Scalar motion_ = 0;                       // of the contact in the tick of the last correction [m]
-    Index period_, ticks_ = period_;          // of corrections, and since the last one
-    std::vector<Scalar> weights_;             // of points in the mean of layer 0
-    std::array<Rows, 3> response_;            // of the points to a force on the held vertices
-    IndexSet held_;                           // layer 0, then those prescribed
-    std::size_t in_contact_ = 0;              // number of the first
-    Scalar force_tolerance_ = 0;              // of one vertex [N]
-    bool may_tear_ = false, has_changed_ = false;
+    Rows compliance_;                             // of the points, by columns [m/N]
+    std::vector<Scalar> tolerance_;               // of the force on each point [N]
+    Rows x_, trial_, displacement_, forces_;      // of vertices, in the frame of the body
+    Rows residual_, step_, last_;                 // of points: forces, displacements of this tick and the last one
+    Rows rows_ahead_;                             // of vertices: displaced in advance
+    Scalar repeats_ = 0;                          // the part of `last_` that was
+    Scalar length_ = 1;                           // of the last step
+    Scalar advanced_ = 1;                         // how often `rows_ahead_` were added
+    Scalar motion_ = 0;                           // of the contact in the tick of the last correction [m]
+    Index period_, ticks_ = period_;              // of corrections, and since the last one
+    std::vector<Scalar> weights_;                 // of points in the mean of layer 0
+    std::array<Rows, 3> response_;                // of the points to a force on the held vertices
+    IndexSet held_;                               // layer 0, then those prescribed
+    std::size_t in_contact_ = 0;                  // number of the first
+    Scalar force_tolerance_ = 0;                  // of one vertex [N]
+    bool changes_ = false, has_changed_ = false;  // network and foundation: ever, and since the last `update`
     std::array<Index, max_unbalanced> unbalanced_{};
 };
 
@@ -236,7 +237,7 @@ CoarseCorrection<Scalar>::CoarseCorrection(const TriangleMesh<Scalar>& mesh, con
     : points_((options.validate(), mesh), network, options.points),
       period_(options.period),
       held_(mesh.vertex_count()) {
-    if constexpr (FollowsSplit<Network>) may_tear_ = true, splits_ = network.splits();
+    if constexpr (FollowsSplit<Network>) changes_ = true, splits_ = network.splits();
     constexpr bool moves = requires { foundation.body(); };
     static_assert(!moves, "CoarseCorrection: pass the foundation of the body at rest, and its pose to `correct`");
     const Index count = mesh.vertex_count();
@@ -574,7 +575,7 @@ void CoarseCorrection<Scalar>::split(const VertexSplit& split) noexcept {
 
 template <Real Scalar>
 void CoarseCorrection<Scalar>::update() noexcept {
-    has_changed_ = false;
+    changes_ = true, has_changed_ = false;
     for (const auto& kind : kinds_) kind->update();
 }
 
