@@ -10,7 +10,6 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
-#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -170,8 +169,7 @@ Result run(const Path& path, const M& membrane, const Setting& setting, const st
     tree.refit(membrane.start);
     membrane::CoarseCorrection coarse(membrane.mesh, membrane.network, membrane.foundation, {.period = setting.period});
     Points x = membrane.start;
-    std::vector<double> seconds;
-    double squares = 0, all = 0, estimated = 0, all_estimated = 0, worst = 0, largest = 0;
+    double seconds = 0, squares = 0, all = 0, estimated = 0, all_estimated = 0, worst = 0, largest = 0;
     auto expected = right.begin();
     for (int t = 0; t < path.ticks; ++t) {
         const Hand hand = path.hand_at(t);
@@ -188,7 +186,7 @@ Result run(const Path& path, const M& membrane, const Setting& setting, const st
         } else {
             tree.refit(x, report.moved);
         }
-        seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+        seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         if (report.status != membrane::StepStatus::advanced) throw std::runtime_error("a step was refused");
         if (!path.is_compared(t)) continue;
         if (!setting.corrected) estimate = coarse.reaction_error(x, solver);
@@ -198,8 +196,8 @@ Result run(const Path& path, const M& membrane, const Setting& setting, const st
         worst = std::max(worst, apart), largest = std::max(largest, size);
         ++expected;
     }
-    const double mean = std::accumulate(seconds.begin(), seconds.end(), 0.0) / static_cast<double>(seconds.size());
-    return {100 * std::sqrt(squares / all), 100 * worst / largest, 100 * std::sqrt(estimated / all_estimated), mean};
+    return {100 * std::sqrt(squares / all), 100 * worst / largest, 100 * std::sqrt(estimated / all_estimated),
+            seconds / path.ticks};
 }
 
 // Settings take turns, so that a temporary load of the machine affects all.

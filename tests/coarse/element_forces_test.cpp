@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/coarse/element_forces.hpp>
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <utility>
@@ -16,31 +15,11 @@
 
 #include "support/catch.hpp"
 #include "support/random.hpp"
+#include "support/vertex_forces.hpp"
 
 using namespace membrane;
 
 namespace {
-
-template <Real S>
-using Rows = std::vector<PaddedPoint<S>>;
-
-template <Real S>
-Rows<S> rows_of(const Points<S>& x) {
-    Rows<S> rows(static_cast<std::size_t>(x.cols()) + 1);
-    for (Index v = 0; v < x.cols(); ++v) rows[static_cast<std::size_t>(v)].set(point(x, v));
-    return rows;
-}
-
-/// The forces on the vertices of a membrane on a foundation at rest.
-template <Real S, class Network, class Volume>
-Points<S> forces_at(const Points<S>& x, const Network& network, const Volume& foundation) {
-    Points<S> forces(3, x.cols());
-    for (Index v = 0; v < x.cols(); ++v) {
-        const Vector3<S> here = point(x, v);
-        forces.col(v) = network.force_on(v, x).force + foundation.force_on(v, here, here, S(1e-3)).force;
-    }
-    return forces;
-}
 
 /// Forces of all kinds against those on the vertices, at random positions, and changes of the energy against the work
 /// of these forces in between, by Gauss's rule of three points.
@@ -51,25 +30,20 @@ void check(const TriangleMesh<S>& mesh, const Network& network, const Volume& fo
     const auto kinds = element_forces(network, foundation);
     for (int n = 0; n < 20; ++n) {
         const Points<S> x = test::jittered(mesh.positions(), S(2e-4), random);
-        Rows<S> forces(rows_of<S>(x).size());
-        for (const auto& kind : kinds) kind->add_forces(rows_of<S>(x), forces);
-        const Points<S> expected = forces_at<S>(x, network, foundation);
-        S worst = 0;
-        for (Index v = 0; v < x.cols(); ++v)
-            worst = (std::max)(worst, norm<S>(point(expected, v) - forces[static_cast<std::size_t>(v)].point()));
-        CHECK(worst <= tolerance * expected.colwise().norm().maxCoeff());
+        test::check_forces<S>(kinds, x, network, foundation, tolerance);
 
         const Points<S> y = test::jittered(x, S(1e-4), random);
         double work = 0, size = 0;
         for (const auto& [at, weight] : {std::pair(-std::sqrt(0.6), 5.0), {0.0, 8.0}, {std::sqrt(0.6), 5.0}}) {
             const Points<S> between = x + S((1 + at) / 2) * (y - x);
             const Eigen::ArrayXXd along =
-                forces_at<S>(between, network, foundation).cwiseProduct(y - x).template cast<double>();
+                test::forces_at<S>(between, network, foundation).cwiseProduct(y - x).template cast<double>();
             work += weight / 18 * along.sum();
             size += weight / 18 * along.abs().sum();
         }
         double change = 0;
-        for (const auto& kind : kinds) change += static_cast<double>(kind->energy_change(rows_of<S>(x), rows_of<S>(y)));
+        for (const auto& kind : kinds)
+            change += static_cast<double>(kind->energy_change(test::rows_of<S>(x), test::rows_of<S>(y)));
         CHECK(std::abs(change + work) <= energy_tolerance * size);
     }
 }

@@ -5,9 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
 #include <numbers>
-#include <span>
 #include <vector>
 
 #include <membrane/accuracy/equilibrium.hpp>
@@ -23,8 +21,10 @@
 #include <membrane/tissue/tissue.hpp>
 #include <membrane/tissue/triangular_springs.hpp>
 
+#include "support/bits.hpp"
 #include "support/cases.hpp"
 #include "support/catch.hpp"
+#include "support/vertex_forces.hpp"
 #include "support/wild_tear.hpp"
 
 using namespace membrane;
@@ -102,30 +102,6 @@ struct CutCapsule {
     Points<double> x;
 };
 
-bool same_bits(const Points<double>& a, const Points<double>& b) {
-    return std::memcmp(a.data(), b.data(), static_cast<std::size_t>(a.size()) * sizeof(double)) == 0;
-}
-
-/// The forces of all kinds of elements, read again, against those of network and foundation on each vertex.
-template <Real S, class Foundation, class Kinds>
-void check_forces(const test::WildTear<S>& loop, const Foundation& foundation, const Kinds& kinds) {
-    std::vector<PaddedPoint<S>> rows(static_cast<std::size_t>(loop.x.cols()) + 1), forces(rows);
-    for (Index v = 0; v < loop.x.cols(); ++v) rows[static_cast<std::size_t>(v)].set(point(loop.x, v));
-    for (const auto& kind : kinds) {
-        kind->update();
-        kind->add_forces(rows, forces);
-    }
-    S worst = 0, largest = 0;
-    for (Index v = 0; v < loop.x.cols(); ++v) {
-        const Vector3<S> here = point(loop.x, v);
-        const Vector3<S> expected =
-            loop.sheet.force_on(v, loop.x).force + foundation.force_on(v, here, here, S(1e-3)).force;
-        largest = (std::max)(largest, norm(expected));
-        worst = (std::max)(worst, norm<S>(expected - forces[static_cast<std::size_t>(v)].point()));
-    }
-    CHECK(worst <= (sizeof(S) == 4 ? S(1e-4) : S(1e-12)) * largest);
-}
-
 }  // namespace
 
 TEST_CASE("forceps that draw a flap feel the force of its equilibrium", "[coarse][tear]") {
@@ -160,7 +136,7 @@ TEST_CASE("a corrected membrane that was torn is whole again after a reset, to t
     };
     const auto first = run();
     REQUIRE(whole.reset(capsule.tear, capsule.tissue, capsule.solver, capsule.coarse, capsule.x));
-    CHECK(same_bits(first, run()));
+    CHECK(test::same_bits(first, run()));
 }
 
 TEST_CASE("a corrected membrane that was peeled adheres again after a reset, to the bit", "[coarse][snapshot]") {
@@ -185,7 +161,7 @@ TEST_CASE("a corrected membrane that was peeled adheres again after a reset, to 
     const auto first = run();
     CHECK(adhesion.dissipated() > 0);
     REQUIRE(whole.reset(adhesion, solver, coarse, x));
-    CHECK(same_bits(first, run()));
+    CHECK(test::same_bits(first, run()));
 }
 
 TEST_CASE("a correction that has missed a split moves nothing", "[coarse][tear]") {
@@ -200,7 +176,7 @@ TEST_CASE("a correction that has missed a split moves nothing", "[coarse][tear]"
     CHECK(corrected.unbalanced.empty());
     CHECK(std::isnan(corrected.reaction_error[0]));
     CHECK(std::isnan(capsule.coarse.reaction_error(capsule.x, capsule.solver)[0]));
-    CHECK(same_bits(before, capsule.x));
+    CHECK(test::same_bits(before, capsule.x));
     const TriangleMesh<double> torn(capsule.tear.surface().rest_positions(), capsule.tear.surface().triangles());
     CoarseCorrection anew(torn, capsule.tissue, NoFoundation(), {.points = 60});
     CHECK(anew.correct(capsule.x, capsule.solver).corrected);
@@ -229,7 +205,8 @@ TEMPLATE_TEST_CASE("random tears: a correction knows all elements, as the networ
                 loop.normals.update(loop.x);
                 REQUIRE(loop.x.allFinite());
                 if (tick % 10 != 9) continue;
-                check_forces(loop, foundation, kinds);
+                for (const auto& kind : kinds) kind->update();
+                test::check_forces<S>(kinds, loop.x, loop.sheet, foundation, sizeof(S) == 4 ? S(1e-4) : S(1e-12));
             }
             splits += loop.splits;
         });

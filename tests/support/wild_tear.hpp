@@ -145,12 +145,13 @@ struct WildTear {
     membrane::Tool<Scalar> tool;
     Index held = 0;
     Vector target;
-    double nonsense_chance = 0.1;                                        // of an input that no step takes
-    double deadline = 0;                                                 // of a step [readings of its clock]; 0: none
-    int splits = 0, slips = 0;                                           // of vertices; of tissue through the jaws
-    std::function<void(const membrane::TearEvent<Scalar>&)> follow_too;  // called for each event after these parts
+    double nonsense_chance = 0.1;  // of an input that no step takes
+    double deadline = 0;           // of a step [readings of its clock]; 0: none
+    int splits = 0, slips = 0;     // of vertices; of tissue through the jaws
     bool grasps = false,
          grasps_surface = true;  // whether the forceps hold a point; whether that is of the torn surface
+    // Called for each event, after these parts have followed it.
+    std::function<void(const membrane::TearEvent<Scalar>&)> follow_too;
 
   private:
     membrane::CohesionOptions<Scalar> adhesion_options() {

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <membrane/core/fixed_vector.hpp>
 #include <membrane/core/lane_points.hpp>
 #include <membrane/model/mass_spring_network.hpp>
 #include <membrane/model/volume_springs.hpp>
@@ -66,14 +67,14 @@ class ForcesInLanes final : public ElementForces<Scalar> {
     }
 
     void update() noexcept override {
-        for (Pack& pack : packs_) {
-            pack = {};
-            for (auto& corner : pack.corners) corner.fill(spare_);
-        }
+        packs_.clear();
+        Pack empty;
+        for (auto& corner : empty.corners) corner.fill(spare_);
         std::size_t count = 0;
         source_([&](const typename Kind::Instance& instance) {
-            Pack& pack = packs_[count / lanes];
             const std::size_t lane = count++ % lanes;
+            if (lane == 0) packs_.try_push_back(empty);
+            Pack& pack = packs_.items().back();
             kind_.set(pack.constants, lane, instance);
             for (std::size_t i = 0; i < Kind::corner_count; ++i)
                 pack.corners[i][lane] = begin_of_row(instance.corners[i]);
@@ -81,7 +82,7 @@ class ForcesInLanes final : public ElementForces<Scalar> {
     }
 
     void add_forces(const Rows& x, Rows& forces) const noexcept override {
-        for (const Pack& pack : packs_) {
+        for (const Pack& pack : packs_.items()) {
             kind_.for_each_force(pack.constants, corners_of(pack, x), [&](std::size_t i, const Vector3<Wide>& force) {
                 for (std::size_t lane = 0; lane < lanes; ++lane) {  // two lanes may have the same vertex
                     Scalar* sum = forces.front().number.data() + pack.corners[i][lane];
@@ -93,7 +94,7 @@ class ForcesInLanes final : public ElementForces<Scalar> {
 
     [[nodiscard]] Scalar energy_change(const Rows& x, const Rows& y) const noexcept override {
         Wide sum = 0;
-        for (const Pack& pack : packs_)
+        for (const Pack& pack : packs_.items())
             sum += kind_.energy_change(pack.constants, corners_of(pack, x), corners_of(pack, y));
         Scalar all = 0;
         for (std::size_t lane = 0; lane < lanes; ++lane) all += sum[lane];
@@ -119,7 +120,7 @@ class ForcesInLanes final : public ElementForces<Scalar> {
     Kind kind_;
     Source source_;
     Index spare_;
-    std::vector<Pack> packs_;
+    FixedVector<Pack> packs_;
 };
 
 /// Springs of a law.
@@ -211,7 +212,7 @@ struct ElementKind<Scalar, E, false> {
 template <class Volume>
 struct OnFoundation {
     std::array<Index, 1> corners;  ///< the vertex
-    const Volume* foundation;      ///< must outlive this
+    const Volume* foundation;      ///< must outlive this; null: none
 };
 
 /// The forces of a foundation without damping, in lanes.
@@ -230,22 +231,18 @@ struct SpringsOfFoundation {
 /// The forces of a foundation that does not take lanes.
 template <Real Scalar, class Volume>
 struct SpringsOfFoundation<Scalar, Volume, false> {
-    struct Constants {
-        const Volume* foundation = nullptr;
-        std::array<Index, Lanes<Scalar>::count> vertex;
-    };
+    using Constants = std::array<OnFoundation<Volume>, Lanes<Scalar>::count>;
 
     static void set(Constants& constants, std::size_t lane, const OnFoundation<Volume>& on) noexcept {
-        if (!constants.foundation) constants.vertex.fill(no_index);
-        constants.foundation = on.foundation;
-        constants.vertex[lane] = on.corners[0];
+        constants[lane] = on;
     }
     [[nodiscard]] static auto force_on(const Constants& constants, const Vector3<Lanes<Scalar>>& x) noexcept {
         Vector3<Lanes<Scalar>> all = Vector3<Lanes<Scalar>>::Zero();
-        for (std::size_t lane = 0; lane < constants.vertex.size(); ++lane) {
-            if (constants.vertex[lane] == no_index) continue;
+        for (std::size_t lane = 0; lane < constants.size(); ++lane) {
+            const OnFoundation<Volume>& on = constants[lane];
+            if (!on.foundation) continue;
             const auto here = lane_of<Vector3<Scalar>>(x, lane);
-            set_lane(all, lane, constants.foundation->force_on(constants.vertex[lane], here, here, Scalar(1)).force);
+            set_lane(all, lane, on.foundation->force_on(on.corners[0], here, here, Scalar(1)).force);
         }
         return all;
     }
