@@ -94,6 +94,29 @@ TEST_CASE("there are no points without free vertices, and no more than free vert
     }
 }
 
+TEST_CASE("each piece of a mesh has coarse points, however few are asked", "[coarse]") {
+    const auto piece = disc<double>({.radius = 0.005, .rings = 5});
+    const Index vertices = piece.vertex_count(), triangles = piece.triangle_count();
+    for (const Index pieces : {1, 2, 7}) {
+        Points<double> x(3, pieces * vertices);
+        Triangles corners(3, pieces * triangles);
+        for (Index i = 0; i < pieces; ++i) {
+            x.middleCols(i * vertices, vertices) = piece.positions();
+            x.middleCols(i * vertices, vertices).row(0).array() += 0.02 * i;
+            corners.middleCols(i * triangles, triangles) = piece.triangles().array() + i * vertices;
+        }
+        const TriangleMesh<double> mesh(x, corners);
+        const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0});
+        for (Index count = 1; count < 2 * pieces; ++count) {
+            CAPTURE(pieces, count);
+            const CoarsePoints points(mesh, network, count);
+            CHECK(points.count() >= pieces);
+            CHECK(points.spacing() < 0.011);
+            for (Index v = 0; v < mesh.vertex_count(); ++v) CHECK(sum_of_weights(points, v) == Approx(1).margin(1e-6));
+        }
+    }
+}
+
 TEST_CASE("coarse points of another network than the mesh's are refused", "[coarse]") {
     const auto mesh = icosphere<double>({.radius = 0.01, .subdivisions = 1});
     const auto other = icosphere<double>({.radius = 0.01, .subdivisions = 2});

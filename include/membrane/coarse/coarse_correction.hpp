@@ -190,6 +190,7 @@ class CoarseCorrection : public SplitCount {
     [[nodiscard]] Scalar search_line(Scalar work) noexcept;
     [[nodiscard]] Scalar energy_change(Scalar length) noexcept;
     [[nodiscard]] Scalar repetition(Scalar contact_moved) const noexcept;
+    void stop_repeating() noexcept;
     void repeat(PointsRef<Scalar>& x, std::span<const Index> layer_0, std::span<const Index> prescribed,
                 const RigidFrame<Scalar>& pose) noexcept;
     void advance(PointsRef<Scalar>& x, Scalar step_length, const RigidFrame<Scalar>& pose) noexcept;
@@ -208,13 +209,13 @@ class CoarseCorrection : public SplitCount {
     Rows residual_, step_, last_;                 // of points: forces, displacements of this tick and the last one
     Rows rows_ahead_;                             // of vertices: displaced in advance
     Scalar repeats_ = 0;                          // the part of `last_` that was
-    Scalar length_ = 1;                           // of the last step
+    Scalar length_ = 1;                           // of the last step, or tried last
     Scalar advanced_ = 1;                         // how often `rows_ahead_` were added
     Scalar motion_ = 0;                           // of the contact in the tick of the last correction [m]
     Index period_, ticks_ = period_;              // of corrections, and since the last one
     std::vector<Scalar> weights_;                 // of points in the mean of layer 0
     std::array<Rows, 3> response_;                // of the points to a force on the held vertices
-    IndexSet held_;                               // layer 0, then those prescribed
+    IndexSet held_;                               // layer 0 but pinned vertices, then those prescribed
     std::size_t in_contact_ = 0;                  // number of the first
     Scalar force_tolerance_ = 0;                  // of one vertex [N]
     bool changes_ = false, has_changed_ = false;  // network and foundation: ever, and since the last `update`
@@ -266,6 +267,7 @@ template <Real Scalar>
 template <class Network, class Volume>
 void CoarseCorrection<Scalar>::invert_stiffness(const Points<double>& stretched, const Network& network,
                                                 const Volume& volume) {
+    constexpr Scalar for_ever = (std::numeric_limits<Scalar>::max)();  // damping vanishes
     const Eigen::Index three = 3, size = three * points_.count();
     Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(size, size);
     const auto add_block = [&](Index first, Index second, const Eigen::Matrix3d& block) {
@@ -283,7 +285,7 @@ void CoarseCorrection<Scalar>::invert_stiffness(const Points<double>& stretched,
     });
     for (Index v = 0; v < network.vertex_count(); ++v) {
         const auto here = x_[at(v)].point();
-        const auto foundation = static_cast<double>(volume.force_on(v, here, here, Scalar(1)).stiffness);
+        const auto foundation = static_cast<double>(volume.force_on(v, here, here, for_ever).stiffness);
         add_block(v, v, foundation * Eigen::Matrix3d::Identity());
     }
     if (size == 0) return;
@@ -326,7 +328,7 @@ CoarseReport<Scalar> CoarseCorrection<Scalar>::correct(PointsRef<Scalar> x, std:
     if (report.corrected) {
         advance(x, report.step_length, pose);
     } else {
-        reset();
+        stop_repeating();
     }
     ticks_ = 1;
     return report;
@@ -348,7 +350,9 @@ Vector3<Scalar> CoarseCorrection<Scalar>::reaction_error(const ConstPointsRef<Sc
 template <Real Scalar>
 void CoarseCorrection<Scalar>::hold(std::span<const Index> layer_0, std::span<const Index> prescribed) noexcept {
     held_.clear();
-    for (const Index v : layer_0) held_.insert(v);
+    for (const Index v : layer_0) {
+        if (is_free(v)) held_.insert(v);
+    }
     in_contact_ = held_.items().size();
     for (const Index v : prescribed) held_.insert(v);
 }
@@ -462,11 +466,12 @@ void CoarseCorrection<Scalar>::interpolate() noexcept {
 
 // The length of the step, at most 1, with which the energy falls; 0 if none is found. `work` is that of the forces for
 // length 1 [J]. Tries the length of the last correction, and if it is not within a factor of 1.5 of where the parabola
-// through the energy has its minimum, that one.
+// through the energy has its minimum, that one. If none is found the next correction goes on with shorter ones.
 template <Real Scalar>
 Scalar CoarseCorrection<Scalar>::search_line(Scalar work) noexcept {
     constexpr int max_trials = 4;
-    constexpr Scalar factor = 1.5;
+    constexpr Scalar factor = 1.5, shortest = Scalar(1e-6);
+    if (!(length_ > shortest)) length_ = 1;
     for (int i = 0; i < max_trials && length_ > 0; ++i) {
         const Scalar tried = length_, change = energy_change(tried), curvature = 2 * (change + tried * work);
         length_ = curvature > 0 ? (std::min)(tried * tried * work / curvature, Scalar(1)) : Scalar(1);
@@ -495,6 +500,14 @@ Scalar CoarseCorrection<Scalar>::repetition(Scalar contact_moved) const noexcept
     Scalar farthest = 0;
     for (const auto& displacement : step_) farthest = (std::max)(farthest, norm(displacement.point()));
     return (std::min)(contact_moved / farthest, Scalar(1)) * (std::max)(product(step_, last_), Scalar(0)) / larger;
+}
+
+template <Real Scalar>
+void CoarseCorrection<Scalar>::stop_repeating() noexcept {
+    clear(last_);
+    clear(rows_ahead_);
+    repeats_ = motion_ = 0;
+    advanced_ = 1;
 }
 
 // The displacement of a tick is what was added in advance, and its part of the step.
@@ -581,10 +594,8 @@ void CoarseCorrection<Scalar>::update() noexcept {
 
 template <Real Scalar>
 void CoarseCorrection<Scalar>::reset() noexcept {
-    clear(last_);
-    clear(rows_ahead_);
-    repeats_ = motion_ = 0;
-    length_ = advanced_ = 1;
+    stop_repeating();
+    length_ = 1;
     ticks_ = period_;
 }
 

@@ -38,7 +38,8 @@ class CoarsePoints {
         float weight;  ///< of its displacement [1]
     };
 
-    /// About `count` points that are not pinned. Vertices that nothing joins to others have no weights.
+    /// About `count` points that are not pinned; at least one in each piece of the mesh that is not. Vertices that
+    /// nothing joins to others have no weights.
     /// @throws InvalidInput for a network of other vertices than the mesh's. Offline. Cost: O(V log V) for each point.
     template <Real Scalar, ElasticNetwork<Scalar> Network>
     CoarsePoints(const TriangleMesh<Scalar>& mesh, const Network& network, Index count);
@@ -155,16 +156,18 @@ void CoarsePoints::for_each_within(const Graph& graph, Index from, double distan
 }
 
 // Adds the candidate that is farthest from all points, again and again, until all are within `spacing`, or there are
-// `count` points that are not pinned. `distances` are those from each vertex to the nearest point.
+// `count` points that are not pinned and each piece of the mesh has one. `distances` are those from each vertex to the
+// nearest point.
 inline void CoarsePoints::add_points(const Graph& graph, const std::vector<Index>& candidates, double spacing,
                                      Index count, const std::vector<bool>& pinned, std::vector<double>& distances) {
     std::vector<double> found(distances.size(), std::numeric_limits<double>::infinity());
     const auto is_nearer = [&](Index a, Index b) {
         return distances[static_cast<std::size_t>(a)] < distances[static_cast<std::size_t>(b)];
     };
-    while (count > 0 && !candidates.empty()) {
+    while (!candidates.empty()) {
         const Index next = *std::max_element(candidates.begin(), candidates.end(), is_nearer);
-        if (!(distances[static_cast<std::size_t>(next)] > spacing)) return;
+        const double distance = distances[static_cast<std::size_t>(next)];  // infinite in a piece without a point
+        if (!(distance > spacing) || (count <= 0 && is_finite(distance))) return;
         points_.push_back(next);
         count -= pinned[static_cast<std::size_t>(next)] ? 0 : 1;
         for_each_within(graph, next, std::numeric_limits<double>::infinity(), found, [&](Index v, double at) {
