@@ -192,7 +192,7 @@ TEMPLATE_TEST_CASE("random tears: a correction knows all elements, as the networ
         const auto with_foundation = [&](const auto& act) { loop.adheres ? act(loop.adhesion) : act(loop.foundation); };
         with_foundation([&](const auto& foundation) {
             CoarseCorrection<S> coarse(loop.mesh, loop.sheet, foundation,
-                                       {.points = 10 + 10 * (seed % 4), .period = 1 + seed % 3});
+                                       {.points = 10 + 10 * (seed % 4), .tolerance = 0.01 * (seed % 3)});
             const auto kinds = element_forces(loop.sheet, foundation);
             loop.follow_too = [&](const auto& event) { follow(event, coarse); };
             for (int tick = 0; tick < 200; ++tick) {

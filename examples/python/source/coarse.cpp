@@ -41,6 +41,7 @@ auto after_step(const Coarse& self, Eigen::Index points, const Solver& solver, C
 void bind_report(py::module_& module) {
     auto report = py::class_<Report>(module, "CoarseReport", doc("CoarseReport"));
     report.def_readonly("corrected", &Report::corrected, doc("CoarseReport::corrected"))
+        .def_readonly("moved", &Report::moved, doc("CoarseReport::moved"))
         .def_readonly("step_length", &Report::step_length, doc("CoarseReport::step_length"))
         .def_readonly("reaction_error", &Report::reaction_error, doc("CoarseReport::reaction_error"));
     def_property_in_loop(
@@ -54,7 +55,7 @@ void bind_coarse(py::module_& module) {
     bind_report(module);
     auto coarse = py::class_<Coarse>(module, "CoarseCorrection", doc("CoarseCorrection"));
     const Keywords options("CoarseOptions", std::pair("points", &CoarseOptions::points),
-                           std::pair("period", &CoarseOptions::period));
+                           std::pair("tolerance", &CoarseOptions::tolerance));
     options.def_init(coarse, options.taking<const Mesh&, const Network&, const Foundation&>(&coarse_of),
                      py::arg("mesh"), py::arg("network"), py::arg("foundation"), py::keep_alive<1, 3>(),
                      py::keep_alive<1, 4>());

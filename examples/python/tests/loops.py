@@ -333,7 +333,7 @@ def coarse():
     tissue = membrane.Tissue(membrane.TearableSprings(
         mesh, membrane.MassSpringNetwork(mesh, stiffness=20.0, pinned=membrane.border(mesh))))
     foundation = membrane.NoFoundation()
-    coarse = membrane.CoarseCorrection(mesh, tissue, foundation, points=40, period=2)
+    coarse = membrane.CoarseCorrection(mesh, tissue, foundation, points=40, tolerance=0.02)
     solver = membrane.QuasiStaticSolver(tissue, layers=3, sweeps=2)
     tree, tracker = membrane.AabbTree(mesh), membrane.ContactTracker(mesh)
     tear = membrane.Tearing(mesh, membrane.EnergyRelease(toughness=200, thickness=1e-5))

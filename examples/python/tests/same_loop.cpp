@@ -364,7 +364,7 @@ void coarse() {
         mesh, membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
                                           {.stiffness = 20.0, .pinned = membrane::border(mesh)})));
     const membrane::NoFoundation foundation;
-    membrane::CoarseCorrection coarse(mesh, tissue, foundation, {.points = 40, .period = 2});
+    membrane::CoarseCorrection coarse(mesh, tissue, foundation, {.points = 40, .tolerance = 0.02});
     auto solver = membrane::QuasiStaticSolver(tissue, {.layers = 3, .sweeps = 2});
     auto tree = membrane::AabbTree(mesh);
     auto tracker = membrane::ContactTracker(mesh);

@@ -27,8 +27,8 @@
 ///
 ///     membrane::CoarseCorrection coarse(mesh, network, foundation);                     // offline
 ///     const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
-///     (void)coarse.correct(x, solver);
-///     tree.refit(x);                                                                   // more than report.moved
+///     const auto corrected = coarse.correct(x, solver);
+///     corrected.moved ? tree.refit(x) : tree.refit(x, report.moved);
 namespace membrane {
 
 /// Options of a `CoarseCorrection`.
@@ -36,9 +36,10 @@ struct CoarseOptions {
     /// Number of coarse points, roughly, and none for a few with a pinned rim; at most all free vertices. More are more
     /// accurate where the contact is small beside their distance, as of forceps.
     Index points = 128;
-    /// Each call of `correct` of so many corrects. Those between repeat its displacement, by as much as the contact
-    /// moves on, at a fraction of the cost.
-    Index period = 1;
+    /// `correct` corrects where the reaction may be off by this part of it [1], by the last estimate and by how far the
+    /// contact has moved since, and in every 64th call. Other calls repeat the last displacement, by as much as the
+    /// contact moves on, or do nothing where that call found a smaller error. 0: each call corrects.
+    double tolerance = 0.003;
 
     /// @throws InvalidInput for an option out of its range
     void validate() const;
@@ -60,6 +61,7 @@ concept HasQueue = requires(const Solver& solver) {
 template <Real Scalar>
 struct CoarseReport {
     bool corrected = false;  ///< false if it repeated the last one, at equilibrium, or if a number was not finite
+    bool moved = false;      ///< it has moved vertices; if not, a refit needs `StepReport::moved` alone
     Scalar step_length = 0;  ///< by which the line search multiplied the displacement, 0 to 1
     /// An estimate of the error of the step: the sum of its reactions to tools and forceps, less that of the same step
     /// solved to the end [N]. 0 without a constraint, NaN if there is no estimate, as between two corrections. Only its
@@ -94,19 +96,18 @@ class CoarseCorrection : public SplitCount {
                      const CoarseOptions& options = {});
 
     ///@{
-    /// Corrects `x` (3 x V [m]) after a step of `solver`; or with layer 0 of its queue, and the prescribed vertices.
-    /// `pose` is that of the body, `body.pose()` of a `MovingBody`: network and foundation turn with it, a `DeadLoad`
-    /// as well. Of elastic elements and a linear foundation the energy falls, but for what is repeated in advance. If
-    /// `x` does not have V vertices, or the solver has followed other splits, nothing moves. Online. Cost: the forces
-    /// and one or two changes of the energy of all elements, some 30 products for each vertex, nine for each pair of
-    /// points.
+    /// Corrects `x` (3 x V [m]) after a step of `solver`, where `CoarseOptions::tolerance` demands it; or with layer 0
+    /// of its queue, and the prescribed vertices. `pose` is that of the body, `body.pose()` of a `MovingBody`: network
+    /// and foundation turn with it, a `DeadLoad` as well. Of elastic elements and a linear foundation the energy falls,
+    /// but for what is repeated in advance. If `x` does not have V vertices, or the solver has followed other splits,
+    /// nothing moves. Online. Cost of a correction: the forces and one or two changes of the energy of all elements,
+    /// some 30 products for each vertex, nine for each pair of points; else up to one product for each vertex.
     template <detail::HasQueue Solver>
     CoarseReport<Scalar> correct(PointsRef<Scalar> x, const Solver& solver,
                                  const RigidFrame<Scalar>& pose = {}) noexcept {
         if (solver.splits() != splits_) return {.reaction_error = unknown()};
-        const bool evaluates = ticks_ >= period_;
         auto report = correct(x, solver.queue().layer(0), solver.prescribed(), pose);
-        if (has_all(x) && evaluates) report.unbalanced = find_unbalanced(solver.queue());
+        if (is_finite(report.reaction_error)) report.unbalanced = find_unbalanced(solver.queue());
         return report;
     }
     CoarseReport<Scalar> correct(PointsRef<Scalar> x, std::span<const Index> layer_0, std::span<const Index> prescribed,
@@ -149,16 +150,22 @@ class CoarseCorrection : public SplitCount {
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         [[maybe_unused]] const bool changes = self.changes_;
-        visit(self.x_, self.last_, self.repeats_, self.length_, self.advanced_, self.motion_, self.ticks_,
-              self.rows_ahead_, self.points_, self.splits_, self.changes_);
+        visit(self.x_, self.contact_, self.last_, self.repeats_, self.length_, self.advanced_, self.motion_.largest,
+              self.motion_.mean, self.motion_since_, self.error_, self.allowed_motion_, self.ticks_, self.rows_ahead_,
+              self.points_, self.splits_, self.changes_);
         if constexpr (Visit::restores) self.has_changed_ = self.changes_ = self.changes_ || changes;
     }
 
   private:
     using Rows = std::vector<PaddedPoint<Scalar>>;  // of each vertex and one more, or of each point; the extra is 0
     using Four = PaddedVector<Scalar>;
+    struct Motion {  // of the contact in a tick [m]
+        Scalar largest = 0;
+        Vector3<Scalar> mean = Vector3<Scalar>::Zero();
+    };
 
     static constexpr std::size_t max_unbalanced = 16;
+    static constexpr Index max_ticks = 64;  // of corrections [calls]
     [[nodiscard]] bool has_all(const ConstPointsRef<Scalar>& x) const noexcept {
         return x.cols() + 1 == static_cast<Eigen::Index>(x_.size());
     }
@@ -180,20 +187,22 @@ class CoarseCorrection : public SplitCount {
 
     // In the order of a correction.
     void hold(std::span<const Index> layer_0, std::span<const Index> prescribed) noexcept;
-    void find_positions(const ConstPointsRef<Scalar>& x, const RigidFrame<Scalar>& pose) noexcept;
-    void find_residual() noexcept;
+    [[nodiscard]] Motion contact_motion(const ConstPointsRef<Scalar>& x, const RigidFrame<Scalar>& pose) noexcept;
+    [[nodiscard]] bool may_be_off(const Motion& moved) const noexcept;
+    static void find_positions(const ConstPointsRef<Scalar>& x, const RigidFrame<Scalar>& pose,
+                               Rows& positions) noexcept;
+    void find_residual(const Rows& x) noexcept;
     [[nodiscard]] Vector3<Scalar> solve() noexcept;
     [[nodiscard]] Vector3<Scalar> hold_contact() noexcept;
-    [[nodiscard]] Scalar contact_motion() const noexcept;
+    void keep_error(const Vector3<Scalar>& reaction_error) noexcept;
     [[nodiscard]] bool is_balanced() const noexcept;
     void interpolate() noexcept;
     [[nodiscard]] Scalar search_line(Scalar work) noexcept;
     [[nodiscard]] Scalar energy_change(Scalar length) noexcept;
     [[nodiscard]] Scalar repetition(Scalar contact_moved) const noexcept;
     void stop_repeating() noexcept;
-    void repeat(PointsRef<Scalar>& x, std::span<const Index> layer_0, std::span<const Index> prescribed,
-                const RigidFrame<Scalar>& pose) noexcept;
-    void advance(PointsRef<Scalar>& x, Scalar step_length, const RigidFrame<Scalar>& pose) noexcept;
+    void repeat(PointsRef<Scalar>& x, Scalar contact_moved, const RigidFrame<Scalar>& pose) noexcept;
+    void advance(PointsRef<Scalar>& x, Scalar step_length, bool repeats, const RigidFrame<Scalar>& pose) noexcept;
     void displace(PointsRef<Scalar>& x, Index v, const Four& displacement, const RigidFrame<Scalar>& pose) noexcept;
     template <class Queue>
     [[nodiscard]] std::span<const Index> find_unbalanced(const Queue& queue) noexcept;
@@ -204,19 +213,24 @@ class CoarseCorrection : public SplitCount {
     CoarsePoints points_;
     std::vector<std::unique_ptr<ElementForces<Scalar>>> kinds_;
     Rows compliance_;                             // of the points, by columns [m/N]
-    std::vector<Scalar> tolerance_;               // of the force on each point [N]
-    Rows x_, trial_, displacement_, forces_;      // of vertices, in the frame of the body
+    std::vector<Scalar> force_tolerances_;        // of the force on each point [N]
+    Rows x_, trial_, displacement_, forces_;      // of vertices, in the frame of the body; `x_` at the last correction
     Rows residual_, step_, last_;                 // of points: forces, displacements of this tick and the last one
     Rows rows_ahead_;                             // of vertices: displaced in advance
     Scalar repeats_ = 0;                          // the part of `last_` that was
     Scalar length_ = 1;                           // of the last step, or tried last
     Scalar advanced_ = 1;                         // how often `rows_ahead_` were added
-    Scalar motion_ = 0;                           // of the contact in the tick of the last correction [m]
-    Index period_, ticks_ = period_;              // of corrections, and since the last one
+    Motion motion_;                               // of the contact in the tick of the last correction
+    Scalar motion_since_ = 0;                     // of it since then [m]
+    Scalar tolerance_;                            // of the reaction, in parts of it
+    Scalar error_ = 0;                            // of it, in parts of it, at the last correction
+    Scalar allowed_motion_ = 0;                   // with which it stays within the tolerance [m]
+    Index ticks_ = max_ticks;                     // since the last correction
     std::vector<Scalar> weights_;                 // of points in the mean of layer 0
     std::array<Rows, 3> response_;                // of the points to a force on the held vertices
     IndexSet held_;                               // layer 0 but pinned vertices, then those prescribed
     std::size_t in_contact_ = 0;                  // number of the first
+    IndexSet contact_;                            // those of the last call
     Scalar force_tolerance_ = 0;                  // of one vertex [N]
     bool changes_ = false, has_changed_ = false;  // network and foundation: ever, and since the last `update`
     std::array<Index, max_unbalanced> unbalanced_{};
@@ -228,7 +242,7 @@ CoarseCorrection(const TriangleMesh<typename Network::Scalar>&, const Network&, 
 
 inline void CoarseOptions::validate() const {
     if (points < 1) refuse("CoarseCorrection", "points must be at least 1, got ", points);
-    if (period < 1) refuse("CoarseCorrection", "period must be at least 1, got ", period);
+    if (!(tolerance >= 0)) refuse("CoarseCorrection", "tolerance must be at least 0, got ", tolerance);
 }
 
 template <Real Scalar>
@@ -236,8 +250,9 @@ template <ElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume>
 CoarseCorrection<Scalar>::CoarseCorrection(const TriangleMesh<Scalar>& mesh, const Network& network,
                                            const Volume& foundation, const CoarseOptions& options)
     : points_((options.validate(), mesh), network, options.points),
-      period_(options.period),
-      held_(mesh.vertex_count()) {
+      tolerance_(static_cast<Scalar>(options.tolerance)),
+      held_(mesh.vertex_count()),
+      contact_(mesh.vertex_count()) {
     if constexpr (FollowsSplit<Network>) changes_ = true, splits_ = network.splits();
     constexpr bool moves = requires { foundation.body(); };
     static_assert(!moves, "CoarseCorrection: pass the foundation of the body at rest, and its pose to `correct`");
@@ -249,12 +264,12 @@ CoarseCorrection<Scalar>::CoarseCorrection(const TriangleMesh<Scalar>& mesh, con
     for (Rows* rows : {&residual_, &step_, &last_}) rows->resize(at(points_.count()));
     for (Rows& rows : response_) rows.resize(at(points_.count()));
     weights_.assign(at(points_.count()), 0);
-    tolerance_ = weights_;
+    force_tolerances_ = weights_;
     force_tolerance_ = network.force_tolerance();
     for (Index v = 0; v < count; ++v) {
         x_[at(v)].set(point(mesh.positions(), v));
         for (const auto& [k, weight] : points_.weights(v)) {  // roundings add like random numbers
-            auto& tolerance = tolerance_[at(k)];
+            auto& tolerance = force_tolerances_[at(k)];
             tolerance = std::hypot(tolerance, static_cast<Scalar>(weight) * force_tolerance_);
         }
     }
@@ -312,25 +327,34 @@ template <Real Scalar>
 CoarseReport<Scalar> CoarseCorrection<Scalar>::correct(PointsRef<Scalar> x, std::span<const Index> layer_0,
                                                        std::span<const Index> prescribed,
                                                        const RigidFrame<Scalar>& pose) noexcept {
-    if (ticks_ < period_) {
-        repeat(x, layer_0, prescribed, pose);
-        return {.reaction_error = unknown()};
-    }
-    CoarseReport<Scalar> report{.reaction_error = reaction_error(x, layer_0, prescribed, pose)};
+    CoarseReport<Scalar> report{.reaction_error = unknown()};
     if (!has_all(x)) return report;
-    motion_ = contact_motion();
-    std::swap(x_, trial_);
+    hold(layer_0, prescribed);
+    const Motion contact_moved = contact_motion(x, pose);
+    motion_since_ += contact_moved.largest;
+    const bool is_needed = may_be_off(contact_moved);
+    if (++ticks_ < max_ticks && !is_needed) {
+        report.moved = repeats_ > 0;
+        if (report.moved) repeat(x, contact_moved.largest, pose);
+        return report;
+    }
+    if (has_changed_) update();
+    ticks_ = 0;
+    find_positions(x, pose, x_);
+    find_residual(x_);
+    report.reaction_error = pose.vector_to_world(solve());
+    keep_error(report.reaction_error);
+    motion_ = contact_moved;
     if (!is_balanced()) {
         interpolate();
         report.step_length = search_line(product(residual_, step_));
     }
-    report.corrected = report.step_length > 0;
+    report.corrected = report.moved = report.step_length > 0;
     if (report.corrected) {
-        advance(x, report.step_length, pose);
+        advance(x, report.step_length, is_needed, pose);
     } else {
         stop_repeating();
     }
-    ticks_ = 1;
     return report;
 }
 
@@ -342,8 +366,8 @@ Vector3<Scalar> CoarseCorrection<Scalar>::reaction_error(const ConstPointsRef<Sc
     if (!has_all(x)) return unknown();
     if (has_changed_) update();
     hold(layer_0, prescribed);
-    find_positions(x, pose);
-    find_residual();
+    find_positions(x, pose, trial_);
+    find_residual(trial_);
     return pose.vector_to_world(solve());
 }
 
@@ -359,16 +383,16 @@ void CoarseCorrection<Scalar>::hold(std::span<const Index> layer_0, std::span<co
 
 // The positions in the frame of the body.
 template <Real Scalar>
-void CoarseCorrection<Scalar>::find_positions(const ConstPointsRef<Scalar>& x,
-                                              const RigidFrame<Scalar>& pose) noexcept {
-    for (Index v = 0; v < x.cols(); ++v) trial_[at(v)].set(pose.point_to_body(point(x, v)));
+void CoarseCorrection<Scalar>::find_positions(const ConstPointsRef<Scalar>& x, const RigidFrame<Scalar>& pose,
+                                              Rows& positions) noexcept {
+    for (Index v = 0; v < x.cols(); ++v) positions[at(v)].set(pose.point_to_body(point(x, v)));
 }
 
 // The forces on the points: those on the vertices that are not held, times their weights.
 template <Real Scalar>
-void CoarseCorrection<Scalar>::find_residual() noexcept {
+void CoarseCorrection<Scalar>::find_residual(const Rows& x) noexcept {
     clear(forces_);
-    for (const auto& kind : kinds_) kind->add_forces(trial_, forces_);
+    for (const auto& kind : kinds_) kind->add_forces(x, forces_);
     clear(residual_);
     for (std::size_t v = 0; v + 1 < forces_.size(); ++v) {
         if (held_.contains(static_cast<Index>(v))) continue;
@@ -434,19 +458,50 @@ Vector3<Scalar> CoarseCorrection<Scalar>::hold_contact() noexcept {
     return -whole;
 }
 
-// The largest displacement of a vertex of layer 0 since the last correction [m].
+// The error of a reaction, in parts of it, is taken to grow as the contact moves. Without contact each call corrects,
+// until the points are balanced.
 template <Real Scalar>
-Scalar CoarseCorrection<Scalar>::contact_motion() const noexcept {
-    Scalar largest = 0;
-    for (const Index v : held_.items().first(in_contact_))
-        largest = (std::max)(largest, norm<Scalar>(trial_[at(v)].point() - x_[at(v)].point()));
-    return largest;
+void CoarseCorrection<Scalar>::keep_error(const Vector3<Scalar>& reaction_error) noexcept {
+    constexpr Scalar least = (std::numeric_limits<Scalar>::min)();
+    Scalar reaction = least;
+    for (const Index v : held_.items().first(in_contact_)) reaction += norm(forces_[at(v)].point());
+    error_ = in_contact_ > 0 ? norm(reaction_error) / reaction : Scalar(is_balanced() ? 0 : 1);
+    allowed_motion_ = motion_since_ * (std::min)(tolerance_ / (error_ + least), Scalar(2));
+    motion_since_ = 0;
+}
+
+// Whether the error of the reaction may have reached the tolerance: by how far the contact has moved, or as it does not
+// move on as it did.
+template <Real Scalar>
+bool CoarseCorrection<Scalar>::may_be_off(const Motion& moved) const noexcept {
+    const Scalar turned = norm<Scalar>(moved.mean - motion_.mean), larger = (std::max)(moved.largest, motion_.largest);
+    return has_changed_ || !(error_ < tolerance_) || motion_since_ > allowed_motion_ || 2 * turned > larger;
+}
+
+// The displacements since the last call of vertices that are in contact and were; infinite if there are only others.
+template <Real Scalar>
+auto CoarseCorrection<Scalar>::contact_motion(const ConstPointsRef<Scalar>& x, const RigidFrame<Scalar>& pose) noexcept
+    -> Motion {
+    const auto contact = held_.items().first(in_contact_);
+    Motion motion;
+    Scalar count = 0;
+    for (const Index v : contact) {
+        const Vector3<Scalar> here = pose.point_to_body(point(x, v)), moved = here - x_[at(v)].point();
+        x_[at(v)].set(here);
+        if (!contact_.contains(v)) continue;
+        motion.largest = (std::max)(motion.largest, norm(moved));
+        motion.mean += (moved - motion.mean) / ++count;
+    }
+    contact_.clear();
+    for (const Index v : contact) contact_.insert(v);
+    if (count == 0 && !contact.empty()) motion.largest = std::numeric_limits<Scalar>::infinity();
+    return motion;
 }
 
 template <Real Scalar>
 bool CoarseCorrection<Scalar>::is_balanced() const noexcept {
     for (std::size_t k = 0; k < residual_.size(); ++k) {
-        if (!(norm(residual_[k].point()) <= tolerance_[k])) return false;
+        if (!(norm(residual_[k].point()) <= force_tolerances_[k])) return false;
     }
     return true;
 }
@@ -506,18 +561,19 @@ template <Real Scalar>
 void CoarseCorrection<Scalar>::stop_repeating() noexcept {
     clear(last_);
     clear(rows_ahead_);
-    repeats_ = motion_ = 0;
+    repeats_ = 0;
     advanced_ = 1;
+    motion_ = {};
 }
 
 // The displacement of a tick is what was added in advance, and its part of the step.
 template <Real Scalar>
-void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length,
+void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length, bool repeats,
                                        const RigidFrame<Scalar>& pose) noexcept {
     const Four length(step_length), part(1 / advanced_), before(repeats_);
     for (std::size_t k = 0; k < step_.size(); ++k)
         store(part * length * load(step_[k]) + before * load(last_[k]), step_[k]);
-    repeats_ = repetition(motion_);
+    repeats_ = repeats ? repetition(motion_.largest) : Scalar(0);
     advanced_ = 1;
     std::swap(last_, step_);
     for (std::size_t v = 0; v + 1 < x_.size(); ++v) {
@@ -531,14 +587,9 @@ void CoarseCorrection<Scalar>::advance(PointsRef<Scalar>& x, Scalar step_length,
 
 // Adds what is ahead once more, by the part that the contact has moved of what it moved before.
 template <Real Scalar>
-void CoarseCorrection<Scalar>::repeat(PointsRef<Scalar>& x, std::span<const Index> layer_0,
-                                      std::span<const Index> prescribed, const RigidFrame<Scalar>& pose) noexcept {
-    if (!has_all(x)) return;
-    ++ticks_;
-    hold(layer_0, prescribed);
-    find_positions(x, pose);
-    const Scalar moved = contact_motion(), part = moved < motion_ ? moved / motion_ : Scalar(1);
-    std::swap(x_, trial_);
+void CoarseCorrection<Scalar>::repeat(PointsRef<Scalar>& x, Scalar contact_moved,
+                                      const RigidFrame<Scalar>& pose) noexcept {
+    const Scalar part = contact_moved < motion_.largest ? contact_moved / motion_.largest : Scalar(1);
     advanced_ += part;
     for (Index v = 0; v < x.cols(); ++v) {
         if (is_free(v)) displace(x, v, Four(part) * load(rows_ahead_[at(v)]), pose);
@@ -589,6 +640,7 @@ void CoarseCorrection<Scalar>::split(const VertexSplit& split) noexcept {
 template <Real Scalar>
 void CoarseCorrection<Scalar>::update() noexcept {
     changes_ = true, has_changed_ = false;
+    ticks_ = max_ticks;
     for (const auto& kind : kinds_) kind->update();
 }
 
@@ -596,7 +648,8 @@ template <Real Scalar>
 void CoarseCorrection<Scalar>::reset() noexcept {
     stop_repeating();
     length_ = 1;
-    ticks_ = period_;
+    motion_since_ = allowed_motion_ = error_ = 0;
+    ticks_ = max_ticks;
 }
 
 }  // namespace membrane

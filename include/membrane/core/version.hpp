@@ -4,7 +4,7 @@
 ///@{
 /// The version of these headers. The build files read it from here.
 #define MEMBRANE_VERSION_MAJOR 0
-#define MEMBRANE_VERSION_MINOR 19
+#define MEMBRANE_VERSION_MINOR 20
 #define MEMBRANE_VERSION_PATCH 0
 ///@}
 
