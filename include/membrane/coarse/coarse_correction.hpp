@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 
 #include <membrane/coarse/coarse_points.hpp>
 #include <membrane/coarse/element_forces.hpp>
@@ -54,6 +54,24 @@ concept HasQueue = requires(const Solver& solver) {
     { solver.prescribed() } -> std::convertible_to<std::span<const Index>>;
     { solver.splits() } -> std::same_as<Index>;
 };
+
+// The inverse of a symmetric matrix; empty if it is not positive definite. Eliminates in a fixed order: factors by
+// Eigen differ in their last bits from one instruction set to another.
+[[nodiscard]] inline Eigen::MatrixXd inverse_of(Eigen::MatrixXd a) {
+    for (Eigen::Index k = 0; k < a.cols(); ++k) {
+        const double pivot = a(k, k);
+        if (!(pivot > 0)) return {};
+        for (Eigen::Index j = 0; j < a.cols(); ++j) {
+            if (j == k) continue;
+            const double factor = a(k, j) / pivot;
+            a.col(j) -= factor * a.col(k);
+            a(k, j) = factor;
+        }
+        a.col(k) /= -pivot;
+        a(k, k) = 1 / pivot;
+    }
+    return a;
+}
 
 }  // namespace detail
 
@@ -307,13 +325,9 @@ void CoarseCorrection<Scalar>::invert_stiffness(const Points<double>& stretched,
     const double largest = stiffness.cwiseAbs().maxCoeff();
     if (!is_finite(stiffness) || !(largest > 0))  // the largest may hide a NaN
         refuse("CoarseCorrection", "the stiffness at rest must be finite, and above zero, got ", largest, " N/m");
-    Eigen::LDLT<Eigen::MatrixXd> factors;
-    double shift = 1e-8;
-    do {
-        factors.compute(stiffness + shift * largest * Eigen::MatrixXd::Identity(size, size));
-        shift *= 10;
-    } while (!(factors.vectorD().minCoeff() > 0));
-    const Eigen::MatrixXd inverse = factors.solve(Eigen::MatrixXd::Identity(size, size));
+    Eigen::MatrixXd inverse;
+    for (double shift = 1e-8; inverse.size() == 0; shift *= 10)
+        inverse = detail::inverse_of(stiffness + shift * largest * Eigen::MatrixXd::Identity(size, size));
     compliance_.reserve(static_cast<std::size_t>(size) * residual_.size());
     for (Eigen::Index j = 0; j < size; ++j) {
         for (Eigen::Index k = 0; k < size; k += 3) {
