@@ -151,6 +151,7 @@ class Loop {
 
     [[nodiscard]] Moment moment() const { return session_.moment(); }
     [[nodiscard]] Vector3 force() const { return session_.force(); }
+    [[nodiscard]] double force_error() { return session_.force_error(); }
     [[nodiscard]] double radius() const { return hand_.tool().radius; }
     [[nodiscard]] double drawn_radius() const {
         return membrane::drawn_radius(session_.moment().tool, session_.moment().contact, session_.x());
@@ -300,7 +301,8 @@ EMSCRIPTEN_BINDINGS(membrane) {
         .field("layers", &Settings::layers)
         .field("sweeps", &Settings::sweeps)
         .field("safeStep", &Settings::safe_step)
-        .field("volumeSprings", &Settings::volume_springs);
+        .field("volumeSprings", &Settings::volume_springs)
+        .field("coarseCorrection", &Settings::coarse_correction);
     using Tool = membrane::Tool<double>;
     value_object<Tool>("Tool").field("position", &Tool::position).field("radius", &Tool::radius);
     using Patch = membrane::ContactPatch<double>;
@@ -367,6 +369,7 @@ EMSCRIPTEN_BINDINGS(membrane) {
         .function("treeBoxes", &Loop::tree_boxes)
         .function("moment", &Loop::moment)
         .function("force", &Loop::force)
+        .function("forceError", &Loop::force_error)
         .function("radius", &Loop::radius)
         .function("drawnRadius", &Loop::drawn_radius)
         .function("size", &Loop::size)

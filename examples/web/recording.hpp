@@ -5,7 +5,7 @@
 
 namespace web {
 
-/// One tick of a recording: a row of 16 numbers, as in the page's CSV file.
+/// One tick of a recording: a row of 17 numbers, as in the page's CSV file.
 struct Row {
     double time = 0;                  // [s]
     double x = 0, y = 0, z = 0;       // of the tool [m]
@@ -13,9 +13,9 @@ struct Row {
     double grasping = 0, placed = 0;  // whether the forceps are closed; whether the tool came without a path
     double fx = 0, fy = 0, fz = 0;    // on the hand [N]
     double layers = 0, sweeps = 0;    // settings of the tick
-    double safe_step = 0, volume_springs = 0;
+    double safe_step = 0, volume_springs = 0, coarse_correction = 0;
 };
-static_assert(sizeof(Row) == 16 * sizeof(double));
+static_assert(sizeof(Row) == 17 * sizeof(double));
 
 inline Row row_of(const Session& session, bool placed) {
     const auto& [settings, tool, contact, grasp, reaction] = session.moment();
@@ -35,7 +35,8 @@ inline Row row_of(const Session& session, bool placed) {
             double(settings.layers),
             double(settings.sweeps),
             double(settings.safe_step),
-            double(settings.volume_springs)};
+            double(settings.volume_springs),
+            double(settings.coarse_correction)};
 }
 
 inline membrane::Tool<double> tool_of(const Row& row, double radius) {
@@ -47,8 +48,8 @@ inline membrane::Tool<double> tool_of(const Row& row, double radius) {
 }
 
 inline Settings settings_of(const Row& row) {
-    return {static_cast<Index>(row.layers), static_cast<Index>(row.sweeps), row.safe_step != 0,
-            row.volume_springs != 0};
+    return {static_cast<Index>(row.layers), static_cast<Index>(row.sweeps), row.safe_step != 0, row.volume_springs != 0,
+            row.coarse_correction != 0};
 }
 
 /// Of a tool for a membrane of this size [m].

@@ -36,7 +36,7 @@ int main(int argc, char** argv) {
         Row row;
         auto* number = &row.time;
         const char* at = line.c_str();
-        for (int i = 0; i < 16; ++i) {
+        for (std::size_t i = 0; i < sizeof(Row) / sizeof(double); ++i) {
             char* end = nullptr;
             number[i] = std::strtod(at, &end);
             at = end + (*end == ',');

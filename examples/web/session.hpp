@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include <membrane/coarse/coarse_correction.hpp>
 #include <membrane/membrane.hpp>
 
 /// The haptic loop of the page, in WebAssembly and in the native program that the page is compared with.
@@ -19,7 +20,7 @@ constexpr double dt = 1e-3;  // [s]
 
 struct Settings {
     Index layers = 6, sweeps = 2;
-    bool safe_step = false, volume_springs = true;
+    bool safe_step = false, volume_springs = true, coarse_correction = false;
 
     friend bool operator==(const Settings&, const Settings&) = default;
 };
@@ -71,6 +72,7 @@ class Session {
           network_(network()),
           foundation_(foundation()),
           solver_(solver()),
+          coarse_(mesh_, network_, foundation_),
           tree_(mesh_),
           tracker_(mesh_),
           grasper_(mesh_),
@@ -79,10 +81,14 @@ class Session {
 
     /// Other settings, from the present positions.
     void configure(const Settings& settings) {
-        if (std::exchange(settings_, settings) == settings) return;
+        const auto last = std::exchange(settings_, settings);
+        if (last == settings) return;
         network_ = network();
         foundation_ = foundation();
         solver_ = solver();
+        coarse_.reset();
+        if (last.volume_springs != settings.volume_springs)
+            coarse_ = membrane::CoarseCorrection(mesh_, network_, foundation_);
         std::visit([](auto& solver) { solver.wake_all(); }, solver_);
     }
 
@@ -101,8 +107,12 @@ class Session {
                 return solver.step(x_, dt, network_, foundation_, press(tool, contact, grasp), pull(tool, grasp));
             },
             solver_);
-        tree_.refit(x_, report.moved);
-        normals_.update(x_, report.moved);
+        if (settings_.coarse_correction) {
+            correct();
+        } else {
+            tree_.refit(x_, report.moved);
+            normals_.update(x_, report.moved);
+        }
         force_ = feel_({tool, contact, report, grasp});
         moment_ = {settings_, tool, contact, grasp, report.total_reaction()};
     }
@@ -115,6 +125,14 @@ class Session {
     [[nodiscard]] const membrane::Points<double>& normals() const noexcept { return normals_.values(); }
     [[nodiscard]] const Vector3& force() const noexcept { return force_; }
     [[nodiscard]] const Moment& moment() const noexcept { return moment_; }
+
+    /// An estimate of how far the force of the last tick is off that of a step solved to the end [N]; NaN if there is
+    /// none. Moves nothing. Cost: half that of a correction, none if the tick was corrected.
+    [[nodiscard]] double force_error() noexcept {
+        if (settings_.coarse_correction) return norm(corrected_error_);
+        return std::visit([&](const auto& solver) { return norm(coarse_.reaction_error(x_, solver)); }, solver_);
+    }
+
     [[nodiscard]] const membrane::AabbTree<double>& tree() const noexcept { return tree_; }
     [[nodiscard]] const membrane::PropagationQueue& queue() const noexcept {
         return std::visit([](const auto& solver) -> const membrane::PropagationQueue& { return solver.queue(); },
@@ -129,6 +147,13 @@ class Session {
     using Foundation = membrane::VirtualVolumeSprings<double>;
     using Solver = std::variant<membrane::QuasiStaticSolver<double, membrane::BlockStep>,
                                 membrane::QuasiStaticSolver<double, membrane::SafeStep>>;
+
+    /// After a step. All vertices may move.
+    void correct() noexcept {
+        std::visit([&](const auto& solver) { corrected_error_ = coarse_.correct(x_, solver).reaction_error; }, solver_);
+        tree_.refit(x_);
+        normals_.update(x_);
+    }
 
     [[nodiscard]] Network network() const {
         return {mesh_, {}, {.stiffness = 40.0, .pinned = pinned_vertices(mesh_, settings_.volume_springs)}};  // [N/m]
@@ -152,6 +177,7 @@ class Session {
     Network network_;
     Foundation foundation_;
     Solver solver_;
+    membrane::CoarseCorrection<double> coarse_;
     membrane::AabbTree<double> tree_;
     membrane::ContactTracker<double> tracker_;
     membrane::Grasper<double> grasper_;
@@ -159,7 +185,8 @@ class Session {
     membrane::ReactionForce feel_;
     membrane::Points<double> x_;  // 3 x V [m]
     Vector3 force_ = Vector3::Zero();
-    Moment moment_;  // its spans end with the next tick
+    Vector3 corrected_error_ = Vector3::Zero();  // of the force of a corrected tick [N]
+    Moment moment_;                              // its spans end with the next tick
 };
 
 }  // namespace web

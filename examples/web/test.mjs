@@ -111,8 +111,21 @@ async function testRealTime() {
   await page.close();
 }
 
-function native(csv) {
-  return execFileSync(join(folder, "replay"), ["3"], { input: csv, maxBuffer: 1 << 28 })
+// Records what `act` does.
+async function record(page, act) {
+  await page.click("#record");
+  await act();
+  await page.click("#record");
+  await until(page, "!recording");
+  const csv = await page.evaluate(() => window.membrane.csv());
+  return { csv, rows: csv.trim().split("\n").slice(1).map((line) => line.split(",").map(Number)) };
+}
+
+const forcesOf = (rows) => rows.map((row) => row.slice(9, 12));
+const sameTicks = (forces, exact) => forces.filter((force, i) => force.every((f, k) => f === exact[i][k])).length;
+
+function native(csv, mesh = "3") {
+  return execFileSync(join(folder, "replay"), [mesh], { input: csv, maxBuffer: 1 << 28 })
     .toString()
     .trim()
     .split("\n")
@@ -121,24 +134,21 @@ function native(csv) {
 
 async function testForces() {
   const page = await open();
-  await page.click("#record");
-  await stroke(page, path);
-  await picture(page, "pressed");
-  await page.mouse.up();
-  await page.keyboard.down("Shift");
-  await stroke(page, [[0.4, 0.4], [0.35, 0.15]]);
-  await picture(page, "pulled");
-  await page.mouse.up();
-  await page.keyboard.up("Shift");
-  await page.click("#record");
-  await until(page, "!recording");
-  const csv = await page.evaluate(() => window.membrane.csv());
-  const rows = csv.trim().split("\n").slice(1).map((line) => line.split(",").map(Number));
-  const forces = rows.map((row) => row.slice(9, 12));
+  const { csv, rows } = await record(page, async () => {
+    await stroke(page, path);
+    await picture(page, "pressed");
+    await page.mouse.up();
+    await page.keyboard.down("Shift");
+    await stroke(page, [[0.4, 0.4], [0.35, 0.15]]);
+    await picture(page, "pulled");
+    await page.mouse.up();
+    await page.keyboard.up("Shift");
+  });
+  const forces = forcesOf(rows);
   const exact = native(csv);
   const largest = Math.max(...forces.map(size));
   const difference = Math.max(...forces.map((force, i) => size(force.map((f, k) => f - exact[i][k])))) / largest;
-  const same = forces.filter((force, i) => force.every((f, k) => f === exact[i][k])).length;
+  const same = sameTicks(forces, exact);
   check("the stroke presses and pulls", largest > 0.02 && rows.some((row) => row[7] === 1), `${largest} N`);
   check("force of the native program, within 1 % of the largest", difference <= 0.01, difference);
   check("and with the same bits", same === forces.length, `${same} of ${forces.length} ticks`);
@@ -223,6 +233,42 @@ async function testChoice(page) {
     const holds = keeps ? time <= parseFloat(button) : /comes closest/.test(text) && time >= parseFloat(button);
     check(`layers and sweeps for ${button}`, holds, `${await dials()}: ${text}`);
   }
+}
+
+// Few layers on a weak foundation: the estimate of the error is large, with the coarse correction small.
+async function testCorrection() {
+  const page = await open();
+  await choose(page, "sphere 4");
+  await page.locator("#layers").fill("0");
+  const found = [];
+  for (const name of ["band", "band_corrected"]) {
+    await page.setChecked("#coarseCorrection", name === "band_corrected");
+    const hold = (rows) => window.membrane.hold(200, Float64Array.from(rows));
+    const { error, reaction } = await page.evaluate(hold, recordedStroke(false));
+    const [force, text] = [size(reaction), await page.textContent("#force")];
+    const estimate = (await state(page)).forceError / force;
+    found.push({ force, error, estimate, text, drawn: await drawnPart(page, name, "#plot canvas") });
+  }
+  const [alone, corrected] = found;
+  const percents = ({ estimate, error }) => `${(100 * estimate).toFixed(1)} %, is ${(100 * error).toFixed(1)} %`;
+  const large = alone.estimate > 0.1 && alone.estimate > alone.error / 3 && alone.estimate < 3 * alone.error;
+  check("estimate of the error, few layers", large, `${alone.text}: ${percents(alone)}`);
+  const small = corrected.estimate < 0.3 * alone.estimate && corrected.error < 0.3 * alone.error;
+  check("it is small with the correction", small, `${corrected.text}: ${percents(corrected)}`);
+  check("and the force another", corrected.force < 0.95 * alone.force);
+  const parts = found.map(({ drawn }) => `${(100 * drawn).toFixed(1)} %`).join(", ");
+  check("the band is drawn, then it is narrow", alone.drawn > corrected.drawn + 0.005, `${parts} of the plot`);
+
+  const { csv, rows } = await record(page, async () => {
+    await stroke(page, path);
+    await page.dispatchEvent("#coarseCorrection", "click"); // while the mouse presses
+    await simulate(page, 0.2);
+    await page.mouse.up();
+  });
+  const both = [0, 1].every((on) => rows.some((row) => row[16] === on && size(row.slice(9, 12)) > 0.01));
+  const same = sameTicks(forcesOf(rows), native(csv, "4"));
+  check("the native program corrects the same ticks", both && same === rows.length, `${same} of ${rows.length}`);
+  await page.close();
 }
 
 async function testFiles() {
@@ -377,9 +423,9 @@ function distance(a, b) {
   return Math.max(...a.triangles.map(between));
 }
 
-// Part of the pixels of the view that are not those of its corner.
-async function drawnPart(page, name) {
-  const png = await page.locator("#view").screenshot({ path: join(folder, `${name}.png`) });
+// Part of the pixels of the view, or of another element, that are not those of its corner.
+async function drawnPart(page, name, element = "#view") {
+  const png = await page.locator(element).screenshot({ path: join(folder, `${name}.png`) });
   return page.evaluate(async (url) => {
     const image = new Image();
     image.src = url;
@@ -499,7 +545,7 @@ function recordedStroke(grasping) {
     const [p, q] = [at(tick), at(tick + 1)];
     const velocity = q.map((x, k) => (x - p[k]) / 1e-3);
     const closed = Number(grasping && tick >= 190);
-    return [tick * 1e-3, ...p, ...velocity, closed, Number(tick === 0), 0, 0, 0, 6, 2, 0, 1];
+    return [tick * 1e-3, ...p, ...velocity, closed, Number(tick === 0), 0, 0, 0, 6, 2, 0, 1, 0];
   }).flat();
 }
 
@@ -548,7 +594,7 @@ async function drawOperations() {
 }
 
 async function drawPage() {
-  const page = await open({ viewport: { width: 1100, height: 1000 } });
+  const page = await open({ viewport: { width: 1160, height: 1045 } });
   await page.check("#contact");
   await stroke(page, [[0.62, 0.42], [0.54, 0.48]]);
   await simulate(page, 3);
@@ -579,8 +625,9 @@ if (renew) {
   await drawPage();
   await drawOperations();
 }
-const ofPress = [testFirstPress, testRealTime, testForces, testFiles, testKeys, testMembranes, testMishaps, testStates];
-const tests = [...ofPress, testCapsulorhexis, testPeel];
+const ofForce = [testFirstPress, testRealTime, testForces, testCorrection];
+const ofPress = [testFiles, testKeys, testMembranes, testMishaps, testStates];
+const tests = [...ofForce, ...ofPress, testCapsulorhexis, testPeel];
 try {
   for (const test of tests) await test();
 } catch (error) {

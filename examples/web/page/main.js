@@ -139,11 +139,11 @@ function show(message) {
   state = message;
   ++frames;
   hand.holding = message.holding;
-  plot.add(message.forces);
+  plot.add(message.forces, message.forceError);
   times.add(message.times, message.elapsed);
   if (message.moment && message.touching) physics.measure(message.moment, plot.time);
   scene.show(message, panel.scale());
-  panel.showForce(Math.hypot(...message.force), message.touching || message.holding);
+  panel.showForce(Math.hypot(...message.force), message.forceError, message.touching || message.holding);
   panel.showProgress(message.progress);
   panel.showReplay(message.left > 0 ? "runs" : replaying ? "ended" : "", message.differing);
   if (plot.worstError() === null) panel.showError(undefined, null);
@@ -171,7 +171,7 @@ window.membrane = {
     const { force, touching, holding, positions, left, progress } = state ?? { force: [0, 0, 0], positions: [] };
     const vertices = positions.length / 3;
     const run = { frames, recording, left, progress, time: plot.time, ...times.summary() };
-    return { force, touching, holding, vertices, ...run };
+    return { force, forceError: state?.forceError, touching, holding, vertices, ...run };
   },
   // What is drawn.
   get surface() {

@@ -14,7 +14,7 @@ const firstHint = element("hint").textContent;
 export class Panel {
   // depth [size of the membrane]
   options = { mode: "press", depth: 0.2, colour: "displacement", show: { contact: false, boxes: false } };
-  settings = { layers: 6, sweeps: 2, safeStep: false, volumeSprings: true };
+  settings = { layers: 6, sweeps: 2, safeStep: false, volumeSprings: true, coarseCorrection: false };
   size = 0; // of the membrane [m]
 
   operation = null; // what is shown of it; null: press and pull
@@ -30,7 +30,8 @@ export class Panel {
     this.dial("sweeps", (n) => n, (n) => set(settings, "sweeps", n));
     this.dial("depth", (n) => `${(100 * n * this.size).toFixed(1)} mm`, (n) => set(options, "depth", n / 10));
     const changed = (id, act) => element(id).addEventListener("change", ({ target }) => act(target));
-    changed("volumeSprings", ({ checked }) => set(settings, "volumeSprings", checked));
+    for (const name of ["volumeSprings", "coarseCorrection"])
+      changed(name, ({ checked }) => set(settings, name, checked));
     changed("rule", ({ value }) => set(settings, "safeStep", value === "safe"));
     changed("mode", ({ value }) => set(options, "mode", value));
     changed("colour", ({ value }) => {
@@ -134,8 +135,10 @@ export class Panel {
     element("scale").querySelectorAll("span").forEach((span, i) => (span.textContent = labels[i]));
   }
 
-  showForce(newtons, touching) {
-    element("force").textContent = this.operation ? `${(1e3 * newtons).toPrecision(3)} mN` : `${newtons.toFixed(4)} N`;
+  // `error`: an estimate of that of the force [N], if there is one.
+  showForce(newtons, error, touching) {
+    const number = newtons.toFixed(4) + (error > 0 ? ` ± ${error.toFixed(4)}` : "");
+    element("force").textContent = this.operation ? `${(1e3 * newtons).toPrecision(3)} mN` : `${number} N`;
     if (newtons > 0) element("hint").classList.add("done");
     if (touching && element("choice").textContent === pressFirst) element("choice").textContent = "";
   }
@@ -173,6 +176,7 @@ export class Panel {
       element(name).value = choice[name];
       element(name).dispatchEvent(new Event("input"));
     }
+    if (element("coarseCorrection").checked) element("coarseCorrection").click(); // the choice is of steps alone
     const result = `${percent(choice.forceError)} and ${(1e6 * choice.time).toFixed(0)} µs on your last stroke`;
     const kept = forceError > 0 ? "the quickest that keeps the error" : "the most accurate that keeps the time";
     const text = choice.satisfied ? kept : "no setting does what you ask, this comes closest";

@@ -74,6 +74,7 @@ const handlers = {
       forces: new Float64Array(loop.forces()),
       times: new Float64Array(loop.times()),
       force: loop.force(),
+      forceError: loop.forceError(),
       tool: now.tool.position,
       radius: loop.drawnRadius(),
       touching: now.contact.touching,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// The force of the last seconds, a point for each tick, and the forces of the equilibria that were found.
+// The force of the last seconds, a point for each tick, in a band of its estimated error, and the forces of the
+// equilibria that were found.
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 
@@ -30,9 +31,12 @@ export class Plot {
           {},
           { stroke: colour("--accent"), width: 2, points: { show: false } },
           { stroke: colour("--tool"), fill: colour("--tool"), paths: () => null, points: { show: true, size: 6 } },
+          { points: { show: false } },
+          { points: { show: false } },
         ],
+        bands: [{ series: [3, 4], fill: colour("--band") }],
       },
-      [[], [], []],
+      this.ticks,
       parent,
     );
     new ResizeObserver(() => this.resize()).observe(parent);
@@ -44,7 +48,7 @@ export class Plot {
     this.usual = usual;
     this.time = 0; // [s]
     this.errors = [];
-    this.ticks = [[], [], []]; // time [s], force, force of the equilibrium [mN]
+    this.ticks = [[], [], [], [], []]; // time [s], force, that of the equilibrium, ends of the band [mN]
   }
 
   resize() {
@@ -56,14 +60,16 @@ export class Plot {
     });
   }
 
-  // The forces of the ticks of a frame [N].
-  add(forces) {
-    const [times, values, exact] = this.ticks;
+  // The forces of the ticks of a frame, and an estimate of the error of the last one, if there is one [N].
+  add(forces, error) {
+    const [times, values, exact, upper, lower] = this.ticks;
     for (const force of forces) {
       this.time += 1e-3;
       times.push(this.time);
       values.push(1e3 * force);
       exact.push(null);
+      upper.push(error > 0 ? 1e3 * (force + error) : null);
+      lower.push(error > 0 ? 1e3 * (force - error) : null);
     }
     const old = times.length - 1000 * seconds;
     if (old > 500) for (const list of this.ticks) list.splice(0, old);

@@ -2,7 +2,7 @@
 //
 // A recording as a CSV file: a row for each tick, numbers with all their digits.
 const names = ["time [s]", "x [m]", "y [m]", "z [m]", "vx [m/s]", "vy [m/s]", "vz [m/s]", "grasping", "placed"].concat(
-  ["fx [N]", "fy [N]", "fz [N]", "layers", "sweeps", "safe_step", "volume_springs"],
+  ["fx [N]", "fy [N]", "fz [N]", "layers", "sweeps", "safe_step", "volume_springs", "coarse_correction"],
 );
 
 export function csvOf(rows) {
