@@ -107,8 +107,9 @@ class Session {
                 return solver.step(x_, dt, network_, foundation_, press(tool, contact, grasp), pull(tool, grasp));
             },
             solver_);
-        if (settings_.coarse_correction) {
-            correct();
+        if (correct()) {
+            tree_.refit(x_);
+            normals_.update(x_);
         } else {
             tree_.refit(x_, report.moved);
             normals_.update(x_, report.moved);
@@ -127,7 +128,7 @@ class Session {
     [[nodiscard]] const Moment& moment() const noexcept { return moment_; }
 
     /// An estimate of how far the force of the last tick is off that of a step solved to the end [N]; NaN if there is
-    /// none. Moves nothing. Cost: half that of a correction, none if the tick was corrected.
+    /// none. With corrections it is that of the last one. Moves nothing. Cost without: half that of a correction.
     [[nodiscard]] double force_error() noexcept {
         if (settings_.coarse_correction) return norm(corrected_error_);
         return std::visit([&](const auto& solver) { return norm(coarse_.reaction_error(x_, solver)); }, solver_);
@@ -148,11 +149,12 @@ class Session {
     using Solver = std::variant<membrane::QuasiStaticSolver<double, membrane::BlockStep>,
                                 membrane::QuasiStaticSolver<double, membrane::SafeStep>>;
 
-    /// After a step. All vertices may move.
-    void correct() noexcept {
-        std::visit([&](const auto& solver) { corrected_error_ = coarse_.correct(x_, solver).reaction_error; }, solver_);
-        tree_.refit(x_);
-        normals_.update(x_);
+    /// Corrects a step where its force may be off. Returns whether that moved vertices.
+    bool correct() noexcept {
+        if (!settings_.coarse_correction) return false;
+        const auto report = std::visit([&](const auto& solver) { return coarse_.correct(x_, solver); }, solver_);
+        if (membrane::is_finite(report.reaction_error)) corrected_error_ = report.reaction_error;
+        return report.moved;
     }
 
     [[nodiscard]] Network network() const {
@@ -185,7 +187,7 @@ class Session {
     membrane::ReactionForce feel_;
     membrane::Points<double> x_;  // 3 x V [m]
     Vector3 force_ = Vector3::Zero();
-    Vector3 corrected_error_ = Vector3::Zero();  // of the force of a corrected tick [N]
+    Vector3 corrected_error_ = Vector3::Zero();  // of the force, found by the last correction [N]
     Moment moment_;                              // its spans end with the next tick
 };
 
