@@ -50,13 +50,13 @@ struct Setting {
     const char* name;
     membrane::SolverOptions<double> solver;
     bool corrected, wakes;
-    Index period = 1;  // of corrections
+    double tolerance = membrane::CoarseOptions().tolerance;
 };
 const Setting settings[]{{"6 layers", {.layers = 6, .sweeps = 2}, false, false},
                          {"all layers", {.layers = membrane::unlimited, .sweeps = 2}, false, false},
-                         {"6 layers and correction", {.layers = 6, .sweeps = 2}, true, false},
-                         {"correction in one tick of three", {.layers = 6, .sweeps = 2}, true, false, 3},
-                         {"correction and unbalanced woken", {.layers = 6, .sweeps = 2}, true, true}};
+                         {"6 layers corrected", {.layers = 6, .sweeps = 2}, true, false},
+                         {"corrected in each tick", {.layers = 6, .sweeps = 2}, true, false, 0},
+                         {"corrected and unbalanced woken", {.layers = 6, .sweeps = 2}, true, true}};
 
 /// Ticks of a scene.
 struct Timing {
@@ -243,7 +243,7 @@ Result run(const Path& path, const M& membrane, const Setting& setting, const st
     membrane::ContactTracker<double> tracker(membrane.mesh);
     membrane::AabbTree<double> tree(membrane.mesh);
     tree.refit(membrane.start);
-    membrane::CoarseCorrection coarse(membrane.mesh, network, membrane.foundation, {.period = setting.period});
+    membrane::CoarseCorrection coarse(membrane.mesh, network, membrane.foundation, {.tolerance = setting.tolerance});
     Points x = membrane.start;
     (void)cut(membrane, x, network, solver, coarse);
     Result result{std::vector<Errors>(path.names.size())};
@@ -259,7 +259,7 @@ Result run(const Path& path, const M& membrane, const Setting& setting, const st
             const auto corrected = coarse.correct(x, solver);
             estimate = corrected.reaction_error;
             if (setting.wakes) solver.wake(corrected.unbalanced);
-            tree.refit(x);
+            corrected.moved ? tree.refit(x) : tree.refit(x, report.moved);
         } else {
             tree.refit(x, report.moved);
         }

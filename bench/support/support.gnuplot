@@ -14,7 +14,7 @@ set yrange [] reverse
 set offsets 0, 0, 0.7, 0.7
 set ytics nomirror font ',10'
 set key outside bottom center horizontal
-settings = '"6 layers" "all layers" "6 layers and correction" "correction in one tick of three" "correction and unbalanced woken"'
+settings = '"6 layers" "all layers" "6 layers corrected" "corrected in each tick" "corrected and unbalanced woken"'
 colours = '#c0392b #d68910 #1a1a1a #2471a3 #1e8449'
 rows(setting) = sprintf("< awk -F, '$3 == \"%s\"' support.csv", setting)
 name(scene, vertices) = sprintf('%s, %s', scene, vertices)
