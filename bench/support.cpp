@@ -211,6 +211,12 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
+std::string two_digits(double number) {
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), "%.2f", number);
+    return text.data();
+}
+
 /// Of the force on one tool.
 class Errors {
   public:
@@ -224,7 +230,10 @@ class Errors {
     /// The rms of the differences over that of the forces, the largest ones, and the rms of the estimates [%].
     [[nodiscard]] double rms() const { return 100 * std::sqrt(squares_ / all_); }
     [[nodiscard]] double worst() const { return 100 * worst_ / largest_; }
-    [[nodiscard]] double estimate() const { return 100 * std::sqrt(estimated_ / all_estimated_); }
+    [[nodiscard]] std::string estimate() const {
+        if (all_estimated_ == 0) return "none";  // no compared tick was corrected
+        return two_digits(100 * std::sqrt(estimated_ / all_estimated_));
+    }
     ///@}
 
   private:
@@ -295,8 +304,8 @@ void measure(std::ofstream& file, const Path& path, const M& membrane) {
             const Errors& errors = last[i].errors[r];
             const char *scene = path.names[r].c_str(), *setting = settings[i].name;
             const double time = 1e6 * median(seconds[i]), ratio = median(ratios[i]);
-            std::printf("| %s | %d | %s | %.2f %% | %.2f %% | %.2f %% | %.0f us | %.2f |\n", scene, vertices, setting,
-                        errors.rms(), errors.worst(), errors.estimate(), time, ratio);
+            std::printf("| %s | %d | %s | %.2f %% | %.2f %% | %s %% | %.0f us | %.2f |\n", scene, vertices, setting,
+                        errors.rms(), errors.worst(), errors.estimate().c_str(), time, ratio);
             file << scene << ',' << vertices << ',' << setting << ',' << errors.rms() << ',' << errors.worst() << ','
                  << errors.estimate() << ',' << time << ',' << ratio << std::endl;
         }
