@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// Runs 28 scenes in double and in float, and prints a hash of all positions, forces and reports after 1, 10, ... ticks:
+// Runs 30 scenes in double and in float, and prints a hash of all positions, forces and reports after 1, 10, ... ticks:
 //
 //     scenes [--ticks 10000] [--threads 1] [--scene NAME]
 //     scenes [--ticks 1000] [--threads 1] --record FILE
@@ -25,6 +25,7 @@
 #include <utility>
 #include <vector>
 
+#include <membrane/coarse/coarse_correction.hpp>
 #include <membrane/core/thread_pool.hpp>
 #include <membrane/haptics/contact_friction.hpp>
 #include <membrane/haptics/force_limits.hpp>
@@ -437,6 +438,29 @@ class Torn : public Loop<Scalar, Network, Foundation, membrane::BlockStep> {
     int tick_ = 0;
 };
 
+/// A membrane that a coarse correction follows.
+template <class Scalar, class Network, class Foundation>
+class Corrected : public Loop<Scalar, Network, Foundation, membrane::BlockStep> {
+    using Base = Loop<Scalar, Network, Foundation, membrane::BlockStep>;
+
+  public:
+    Corrected(std::string_view name, const membrane::TriangleMesh<Scalar>& mesh, const Network& network,
+              const Foundation& foundation, const Variant<Scalar>& variant)
+        : Base(name, mesh, network, foundation, variant, membrane::AnyExecutor()),
+          coarse_(mesh, network, foundation, {.points = 40}) {}
+
+    void tick() {
+        Base::tick();
+        const auto corrected = coarse_.correct(this->x_, this->solver_);
+        this->solver_.wake(corrected.unbalanced);
+        if (corrected.moved) this->tree_.refit(this->x_);
+        if (membrane::is_finite(corrected.reaction_error)) this->hash_.add(corrected.reaction_error);
+    }
+
+  private:
+    membrane::CoarseCorrection<Scalar> coarse_;
+};
+
 /// What the hand feels is in the hash, too.
 template <class Scalar, class Network, class Foundation>
 class AtHand : public Loop<Scalar, Network, Foundation, membrane::BlockStep> {
@@ -595,6 +619,10 @@ class Scenes {
         loop("forceps", ball, network(ball), foundation(ball), V{.grasps = true});
         loop("load_and_pin", ball, network(ball), foundation(ball), V{.loads = true});
         loop("no_foundation", flat, network(flat), membrane::NoFoundation(), V{.flat = true});
+        if (asked("corrected")) {
+            run<Scalar>(request_, "corrected",
+                        Corrected("corrected", flat, network(flat), membrane::NoFoundation(), V{.flat = true}));
+        }
     }
 
     void run_laws(const membrane::TriangleMesh<Scalar>& ball) {
