@@ -396,6 +396,39 @@ TEST_CASE("with a tolerance fewer calls correct, and the force stays near that w
     }
 }
 
+TEST_CASE("with a tolerance a tool that is lifted off at once after it stood still is noticed", "[coarse]") {
+    // One tool alone, and one of two: steps of both in lockstep with a correction in each call.
+    const Capsule<double> capsule(12);
+    const auto near_tool = ball<double>(1e-3, -2e-3, 0.7e-3), other = ball<double>(1e-3, 2e-3, 0.7e-3);
+    const auto lifted = ball<double>(1e-3, 2e-3, 2e-3);
+    for (const bool two : {false, true}) {
+        for (const int still : {100, 131, 150}) {
+            CAPTURE(two, still);
+            Loop<double, Capsule<double>> each(capsule), fewer(capsule, {}, 0.01);
+            const auto tick = [&](auto& loop, ContactTracker<double>& second, const Tool<double>& tool) {
+                const auto contact = loop.tracker.update(loop.tree, loop.x, two ? near_tool : lifted);
+                const auto second_contact = second.update(loop.tree, loop.x, tool);
+                const auto report =
+                    loop.solver.step(loop.x, 1e-3, capsule.network, capsule.foundation,
+                                     press(two ? near_tool : lifted, contact), press(tool, second_contact));
+                (void)loop.coarse.correct(loop.x, loop.solver);
+                loop.tree.refit(loop.x);
+                return Vector3<double>(report.reactions[0]);
+            };
+            ContactTracker<double> second_of_each(capsule.mesh), second_of_fewer(capsule.mesh);
+            for (int i = 0; i < still; ++i) {
+                (void)tick(each, second_of_each, other);
+                (void)tick(fewer, second_of_fewer, other);
+            }
+            for (int i = 0; i < 20; ++i) {
+                const auto expected = tick(each, second_of_each, lifted), force = tick(fewer, second_of_fewer, lifted);
+                if (i > 1) CHECK((fewer.x - each.x).colwise().norm().maxCoeff() < 1e-5);
+                CHECK(norm<double>(force - expected) <= 0.02 * norm(expected));
+            }
+        }
+    }
+}
+
 TEST_CASE("after any stroke a corrected membrane comes back to rest", "[coarse]") {
     const auto check = [](const auto& scene, double radius, double top, double speed, double depth, int seed) {
         CAPTURE(radius, speed, depth, seed);

@@ -36,8 +36,8 @@ struct CoarseOptions {
     /// Number of coarse points, roughly, and none for a few with a pinned rim; at most all free vertices. More are more
     /// accurate where the contact is small beside their distance, as of forceps.
     Index points = 128;
-    /// `correct` corrects where the reaction may be off by this part of it [1], by the last estimate and by how far the
-    /// contact has moved since, and in every 64th call. Other calls repeat the last displacement, by as much as the
+    /// `correct` corrects where the reaction may be off by this part of it [1], by the last estimate and by how the
+    /// tools have moved since, and in every 64th call. Other calls repeat the last displacement, by as much as the
     /// contact moves on, or do nothing where that call found a smaller error. 0: each call corrects.
     double tolerance = 0.003;
 
@@ -148,12 +148,16 @@ class CoarseCorrection : public SplitCount {
 
     ///@{
     /// The membrane has torn: a copy has the displacements of its vertex, points and their stiffness stay as they are.
-    /// The next correction calls `update`. Online.
+    /// The next call corrects, after an `update`. Online.
     void split(const VertexSplit& split) noexcept;
-    void reshape(const MovedVertex<Scalar>&) noexcept { has_changed_ = true; }
+    void reshape(const MovedVertex<Scalar>&) noexcept {
+        has_changed_ = true;
+        ticks_ = max_ticks;
+    }
     ///@}
 
     /// Reads network and foundation again, which have changed, as `CohesiveSprings` that fail. They must outlive this.
+    /// The next call corrects.
     /// Online. Cost: about half that of a correction.
     void update() noexcept;
 
@@ -168,7 +172,7 @@ class CoarseCorrection : public SplitCount {
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         [[maybe_unused]] const bool changes = self.changes_;
-        visit(self.x_, self.contact_, self.last_, self.repeats_, self.length_, self.advanced_, self.motion_.largest,
+        visit(self.x_, self.held_before_, self.last_, self.repeats_, self.length_, self.advanced_, self.motion_.largest,
               self.motion_.mean, self.motion_since_, self.error_, self.allowed_motion_, self.ticks_, self.rows_ahead_,
               self.points_, self.splits_, self.changes_);
         if constexpr (Visit::restores) self.has_changed_ = self.changes_ = self.changes_ || changes;
@@ -177,7 +181,7 @@ class CoarseCorrection : public SplitCount {
   private:
     using Rows = std::vector<PaddedPoint<Scalar>>;  // of each vertex and one more, or of each point; the extra is 0
     using Four = PaddedVector<Scalar>;
-    struct Motion {  // of the contact in a tick [m]
+    struct Motion {  // of the held vertices in a tick [m]
         Scalar largest = 0;
         Vector3<Scalar> mean = Vector3<Scalar>::Zero();
     };
@@ -203,9 +207,11 @@ class CoarseCorrection : public SplitCount {
     template <class Network, class Volume>
     void invert_stiffness(const Points<double>& stretched, const Network& network, const Volume& volume);
 
+    void read_again() noexcept;
+
     // In the order of a correction.
     void hold(std::span<const Index> layer_0, std::span<const Index> prescribed) noexcept;
-    [[nodiscard]] Motion contact_motion(const ConstPointsRef<Scalar>& x, const RigidFrame<Scalar>& pose) noexcept;
+    [[nodiscard]] Motion held_motion(const ConstPointsRef<Scalar>& x, const RigidFrame<Scalar>& pose) noexcept;
     [[nodiscard]] bool may_be_off(const Motion& moved) const noexcept;
     static void find_positions(const ConstPointsRef<Scalar>& x, const RigidFrame<Scalar>& pose,
                                Rows& positions) noexcept;
@@ -238,9 +244,9 @@ class CoarseCorrection : public SplitCount {
     Scalar repeats_ = 0;                          // the part of `last_` that was
     Scalar length_ = 1;                           // of the last step, or tried last
     Scalar advanced_ = 1;                         // how often `rows_ahead_` were added
-    Motion motion_;                               // of the contact in the tick of the last correction
-    Scalar motion_since_ = 0;                     // of it since then [m]
-    Scalar tolerance_;                            // of the reaction, in parts of it
+    Motion motion_;                               // in the tick of the last correction
+    Scalar motion_since_ = 0;                     // of the held vertices since then [m]
+    double tolerance_;                            // of the reaction, in parts of it
     Scalar error_ = 0;                            // of it, in parts of it, at the last correction
     Scalar allowed_motion_ = 0;                   // with which it stays within the tolerance [m]
     Index ticks_ = max_ticks;                     // since the last correction
@@ -248,7 +254,7 @@ class CoarseCorrection : public SplitCount {
     std::array<Rows, 3> response_;                // of the points to a force on the held vertices
     IndexSet held_;                               // layer 0 but pinned vertices, then those prescribed
     std::size_t in_contact_ = 0;                  // number of the first
-    IndexSet contact_;                            // those of the last call
+    IndexSet held_before_;                        // those of the last call
     Scalar force_tolerance_ = 0;                  // of one vertex [N]
     bool changes_ = false, has_changed_ = false;  // network and foundation: ever, and since the last `update`
     std::array<Index, max_unbalanced> unbalanced_{};
@@ -268,9 +274,9 @@ template <ElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume>
 CoarseCorrection<Scalar>::CoarseCorrection(const TriangleMesh<Scalar>& mesh, const Network& network,
                                            const Volume& foundation, const CoarseOptions& options)
     : points_((options.validate(), mesh), network, options.points),
-      tolerance_(static_cast<Scalar>(options.tolerance)),
+      tolerance_(options.tolerance),
       held_(mesh.vertex_count()),
-      contact_(mesh.vertex_count()) {
+      held_before_(mesh.vertex_count()) {
     if constexpr (FollowsSplit<Network>) changes_ = true, splits_ = network.splits();
     constexpr bool moves = requires { foundation.body(); };
     static_assert(!moves, "CoarseCorrection: pass the foundation of the body at rest, and its pose to `correct`");
@@ -344,21 +350,21 @@ CoarseReport<Scalar> CoarseCorrection<Scalar>::correct(PointsRef<Scalar> x, std:
     CoarseReport<Scalar> report{.reaction_error = unknown()};
     if (!has_all(x)) return report;
     hold(layer_0, prescribed);
-    const Motion contact_moved = contact_motion(x, pose);
-    motion_since_ += contact_moved.largest;
-    const bool is_needed = may_be_off(contact_moved);
+    const Motion moved = held_motion(x, pose);
+    motion_since_ += moved.largest;
+    const bool is_needed = ticks_ == max_ticks || may_be_off(moved);
     if (++ticks_ < max_ticks && !is_needed) {
         report.moved = repeats_ > 0;
-        if (report.moved) repeat(x, contact_moved.largest, pose);
+        if (report.moved) repeat(x, moved.largest, pose);
         return report;
     }
-    if (has_changed_) update();
+    if (has_changed_) read_again();
     ticks_ = 0;
     find_positions(x, pose, x_);
     find_residual(x_);
     report.reaction_error = pose.vector_to_world(solve());
     keep_error(report.reaction_error);
-    motion_ = contact_moved;
+    motion_ = is_finite(moved.largest) ? moved : Motion();
     if (!is_balanced()) {
         interpolate();
         report.step_length = search_line(product(residual_, step_));
@@ -378,7 +384,7 @@ Vector3<Scalar> CoarseCorrection<Scalar>::reaction_error(const ConstPointsRef<Sc
                                                          std::span<const Index> prescribed,
                                                          const RigidFrame<Scalar>& pose) noexcept {
     if (!has_all(x)) return unknown();
-    if (has_changed_) update();
+    if (has_changed_) read_again();
     hold(layer_0, prescribed);
     find_positions(x, pose, trial_);
     find_residual(trial_);
@@ -472,43 +478,46 @@ Vector3<Scalar> CoarseCorrection<Scalar>::hold_contact() noexcept {
     return -whole;
 }
 
-// The error of a reaction, in parts of it, is taken to grow as the contact moves. Without contact each call corrects,
-// until the points are balanced.
+// The error of a reaction, in parts of it, is taken to grow as the held vertices move. Without contact each call
+// corrects, until the points are balanced.
 template <Real Scalar>
 void CoarseCorrection<Scalar>::keep_error(const Vector3<Scalar>& reaction_error) noexcept {
     constexpr Scalar least = (std::numeric_limits<Scalar>::min)();
     Scalar reaction = least;
     for (const Index v : held_.items().first(in_contact_)) reaction += norm(forces_[at(v)].point());
     error_ = in_contact_ > 0 ? norm(reaction_error) / reaction : Scalar(is_balanced() ? 0 : 1);
-    allowed_motion_ = motion_since_ * (std::min)(tolerance_ / (error_ + least), Scalar(2));
+    const auto longer = static_cast<Scalar>((std::min)(tolerance_ / static_cast<double>(error_ + least), 2.0));
+    allowed_motion_ = is_finite(motion_since_) ? longer * motion_since_ : Scalar(0);
     motion_since_ = 0;
 }
 
-// Whether the error of the reaction may have reached the tolerance: by how far the contact has moved, or as it does not
-// move on as it did.
+// Whether the error of the reaction may have reached the tolerance: by how far the held vertices have moved, or as they
+// do not move on as they did.
 template <Real Scalar>
 bool CoarseCorrection<Scalar>::may_be_off(const Motion& moved) const noexcept {
     const Scalar turned = norm<Scalar>(moved.mean - motion_.mean), larger = (std::max)(moved.largest, motion_.largest);
-    return has_changed_ || !(error_ < tolerance_) || motion_since_ > allowed_motion_ || 2 * turned > larger;
+    return !(static_cast<double>(error_) < tolerance_) || motion_since_ > allowed_motion_ || !(2 * turned <= larger);
 }
 
-// The displacements since the last call of vertices that are in contact and were; infinite if there are only others.
+// The displacements since the last call of the vertices that are held and were. Infinite if too many others are, or
+// were: more than a quarter, or any while the rest stands still.
 template <Real Scalar>
-auto CoarseCorrection<Scalar>::contact_motion(const ConstPointsRef<Scalar>& x, const RigidFrame<Scalar>& pose) noexcept
+auto CoarseCorrection<Scalar>::held_motion(const ConstPointsRef<Scalar>& x, const RigidFrame<Scalar>& pose) noexcept
     -> Motion {
-    const auto contact = held_.items().first(in_contact_);
     Motion motion;
-    Scalar count = 0;
-    for (const Index v : contact) {
+    std::size_t count = 0;
+    for (const Index v : held_.items()) {
         const Vector3<Scalar> here = pose.point_to_body(point(x, v)), moved = here - x_[at(v)].point();
         x_[at(v)].set(here);
-        if (!contact_.contains(v)) continue;
+        if (!held_before_.contains(v)) continue;
         motion.largest = (std::max)(motion.largest, norm(moved));
-        motion.mean += (moved - motion.mean) / ++count;
+        motion.mean += (moved - motion.mean) / static_cast<Scalar>(++count);
     }
-    contact_.clear();
-    for (const Index v : contact) contact_.insert(v);
-    if (count == 0 && !contact.empty()) motion.largest = std::numeric_limits<Scalar>::infinity();
+    const std::size_t all = held_.items().size() + held_before_.items().size(), others = all - 2 * count;
+    if (4 * others > all || (others > 0 && 8 * motion.largest <= motion_.largest))
+        motion.largest = std::numeric_limits<Scalar>::infinity();
+    held_before_.clear();
+    for (const Index v : held_.items()) held_before_.insert(v);
     return motion;
 }
 
@@ -646,15 +655,20 @@ std::span<const Index> CoarseCorrection<Scalar>::find_unbalanced(const Queue& qu
 template <Real Scalar>
 void CoarseCorrection<Scalar>::split(const VertexSplit& split) noexcept {
     ++splits_;
-    has_changed_ = true;
+    reshape({});
     points_.split(split);
     for (Rows* rows : {&x_, &rows_ahead_}) (*rows)[at(split.copy)] = (*rows)[at(split.vertex)];
 }
 
 template <Real Scalar>
 void CoarseCorrection<Scalar>::update() noexcept {
-    changes_ = true, has_changed_ = false;
+    read_again();
     ticks_ = max_ticks;
+}
+
+template <Real Scalar>
+void CoarseCorrection<Scalar>::read_again() noexcept {
+    changes_ = true, has_changed_ = false;
     for (const auto& kind : kinds_) kind->update();
 }
 
