@@ -700,8 +700,10 @@ TEST_CASE("numbers that are not finite, and other counts, move nothing", "[coars
     CHECK(std::isnan(norm(coarse.correct(fewer, {}, {}).reaction_error)));
     CHECK(std::isnan(norm(coarse.reaction_error(fewer, {}, {}))));
     Points<double> x = capsule.mesh.positions();
-    x.row(2).head(7).array() += 1e-4;  // it goes on
-    CHECK(coarse.correct(x, {}, {}).corrected);
+    x.row(2).head(7).array() += 1e-4;  // it goes on, and ignores indices that are none
+    const std::array<Index, 3> none{-1, capsule.mesh.vertex_count(), 1 << 30};
+    CHECK(is_finite(coarse.reaction_error(x, none, none)));
+    CHECK(coarse.correct(x, none, none).corrected);
 }
 
 TEST_CASE("a corrected loop restored from a snapshot goes on to the bit", "[coarse]") {

@@ -157,8 +157,7 @@ class CoarseCorrection : public SplitCount {
     ///@}
 
     /// Reads network and foundation again, which have changed, as `CohesiveSprings` that fail. They must outlive this.
-    /// The next call corrects.
-    /// Online. Cost: about half that of a correction.
+    /// The next call corrects. Online. Cost: about half that of a correction.
     void update() noexcept;
 
     /// The coarse points.
@@ -249,7 +248,7 @@ class CoarseCorrection : public SplitCount {
     double tolerance_;                            // of the reaction, in parts of it
     Scalar error_ = 0;                            // of it, in parts of it, at the last correction
     Scalar allowed_motion_ = 0;                   // with which it stays within the tolerance [m]
-    Index ticks_ = max_ticks;                     // since the last correction
+    Index ticks_ = max_ticks;                     // since the last correction; `max_ticks` if the next must be one
     std::vector<Scalar> weights_;                 // of points in the mean of layer 0
     std::array<Rows, 3> response_;                // of the points to a force on the held vertices
     IndexSet held_;                               // layer 0 but pinned vertices, then those prescribed
@@ -395,7 +394,7 @@ template <Real Scalar>
 void CoarseCorrection<Scalar>::hold(std::span<const Index> layer_0, std::span<const Index> prescribed) noexcept {
     held_.clear();
     for (const Index v : layer_0) {
-        if (is_free(v)) held_.insert(v);
+        if (held_.has(v) && is_free(v)) held_.insert(v);
     }
     in_contact_ = held_.items().size();
     for (const Index v : prescribed) held_.insert(v);
