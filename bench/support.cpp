@@ -232,7 +232,7 @@ class Errors {
     [[nodiscard]] double rms() const { return 100 * std::sqrt(squares_ / all_); }
     [[nodiscard]] double worst() const { return 100 * worst_ / largest_; }
     [[nodiscard]] std::string estimate() const {
-        if (all_estimated_ == 0) return "none";  // no compared tick was corrected
+        if (all_estimated_ == 0) return "-";  // no compared tick was corrected
         return two_digits(100 * std::sqrt(estimated_ / all_estimated_));
     }
     ///@}
