@@ -237,7 +237,7 @@ class CoarseCorrection : public SplitCount {
     std::vector<std::unique_ptr<ElementForces<Scalar>>> kinds_;
     Rows compliance_;                             // of the points, by columns [m/N]
     std::vector<Scalar> force_tolerances_;        // of the force on each point [N]
-    Rows x_, trial_, displacement_, forces_;      // of vertices, in the frame of the body; `x_` at the last correction
+    Rows x_, trial_, displacement_, forces_;      // of vertices, in the frame of the body
     Rows residual_, step_, last_;                 // of points: forces, displacements of this tick and the last one
     Rows rows_ahead_;                             // of vertices: displaced in advance
     Scalar repeats_ = 0;                          // the part of `last_` that was
